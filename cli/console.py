@@ -83,16 +83,20 @@ class Console:
     def finish(self, code: int = 0) -> int:
         """Show the findings; the exit code (1 where there are errors)."""
         found = limit_findings(self.report.diagnostics)
+        # an error in what was typed is a wrong usage, one in a file is not
         if self.report.failed:
             typed = any(d.severity == "error" and d.place and d.place.source.typed for d in self.report)
             code = worst((code or 1, USAGE if typed else 0))
+        # results that were held back until it was clear how it ends
         for text, verbatim in self._results if code else ():
             self.data(text, verbatim=verbatim)
+        # one object, whatever happened
         if self.as_json:
             diagnostics = [*(d.to_json() for d in found), *self._plain]
             if self.command == "check":
                 self.result["edits"] = [edit_to_json(k, d.edit) for k, d in enumerate(found) if d.edit is not None]
             put(json.dumps(finite(envelope(self.command, code, diagnostics, self.result)), allow_nan=False) + "\n")
+        # a form for other programs
         elif self.format is not None:
             kept = [d for d in found if d.severity == "error" or not (self.quiet or self._routine(d))]
             self.data(self.format(kept, self._plain), verbatim=True)

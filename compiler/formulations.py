@@ -74,18 +74,21 @@ def _unknowns(node: Node, kind: str) -> list[Node]:
 def _obstacle(network: Network, wanted: str, place: Place | None) -> Diagnostic | None:
     """The first statement that keeps a model with `coord` out of the complementary family."""
     help_ = "formulation lagrangian, hamiltonian"
+    # inertia that depends on displacements has no complementary form
     for energy in network.energies:
         rates = _unknowns(energy.expression, "f") + _unknowns(energy.expression, "p")
         displacements = _unknowns(energy.expression, "q")
         if energy.function in ("T*", "T") and rates and displacements:
             message = f"not expressible in {wanted}: {energy.function} depends on displacement {displacements[0]}"
             return Diagnostic("E601", f"{message} and on {rates[0]}", energy.place, help_)
+    # a constraint of displacements ties momenta to nothing
     for constraint in network.constraints:
         displacements = _unknowns(constraint.expression, "q")
         if displacements:
             label = f"{constraint.kind} {constraint.name}"
             message = f"not expressible in {wanted}: {label} depends on displacement {displacements[0]}"
             return Diagnostic("E602", message, constraint.place, help_)
+    # nodes and elements have both families
     if not network.coordinates:
         return None
     first = network.coordinates[0]

@@ -162,6 +162,7 @@ def compile_network(
         with at_rest(), budget.drawn(network.place.source.text):
             families = gather_families(network, irregular=not formulation.startswith("co_")) if gather else network
             if families is not network:
+                # families of alike elements first, the text as it is where they fail
                 with suppress(ModelError):  # what is wrong is said of what the author wrote
                     found = _compile_stages(families, formulation, backend, integrating=integrating, traced=traced)
                     return _restore_author_names(found, network)
@@ -173,19 +174,23 @@ def compile_network(
 def _compile_stages(
     network: Network, formulation: str, backend: str, *, integrating: bool, traced: bool
 ) -> CompiledModel:
+    """Compile a network by all stages, each timed; ModelError where one of them refuses."""
     timings: list[Timing] = []
     reflected = formulation.startswith("co_")
+    # nodes and branches become coordinates
     with _time_stage("primal", timings):
         network = along(outermost(network), complementary=reflected)
         family = reflect(network) if reflected else with_momenta(as_elements(network, FOREIGN))
         verify_network(family)
         network, inverted, steps = primal(family, reflected=reflected)
         verify_network(network, coordinates=True)
+    # the energy model: functions, works, rows
     with _time_stage("energies", timings):
         model, cut = energies.energies(network), tuple[Diagnostic, ...]()
         if traced and not network.traced:
             model, cut = with_coordinates_observed(model, network)
         model = in_relative_coordinates(model)
+        # a run: what it reads, in coordinates that hide nothing
         if traced:
             model = with_efforts_of_stores(without_ignorable(model))
         energies.verify_energies(model)
@@ -194,6 +199,7 @@ def _compile_stages(
         found = check_energies(model, network)
         if any(d.severity == "error" for d in found):
             raise ModelError(found)
+    # rows of the formulation
     with _time_stage("descriptor", timings):
         legendre = formulation.endswith("hamiltonian")
         own, rests = legendre_transform(model, network.parameters) if legendre else (model, ())
@@ -202,11 +208,13 @@ def _compile_stages(
         titles = tuple(replace(r, label=word(formulation, r.label)) if r.block == "audit" else r for r in lowered.rows)
         lowered = replace(lowered, formulation=formulation, rows=titles)
         form, branches, many = with_book_signs(lowered), tuple[Parameter, ...](), tuple[Diagnostic, ...]()
+        # corners frozen by pieces, for events
         if traced:
             form, branches, many = frozen(form, network)
         network = replace(network, parameters=(*network.parameters, *branches))
         form = add_scale_blocks(form)
         descriptor.verify_descriptor(form)
+    # operations in the order of their values
     with _time_stage("program", timings):
         program = program_.program(form, tuple(p.name for p in network.parameters if not p.shape))
         verify_program(program)

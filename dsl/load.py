@@ -124,6 +124,7 @@ def network(
                 return _build_network(elaborator, reader, scene, report, required=required, outputs=outputs)
             finally:
                 report.retold(lambda found: point_at_author(elaborator, found))
+    # a text that unfolds into more than memory holds, or what has no derivative: one finding at the model
     except (budget.SpentError, NoDerivativeError) as spent:
         report.add(spent.diagnostic(Place(document.file.source, model.name.span)))
         return None
@@ -140,6 +141,7 @@ def _build_network(
 ) -> Network | None:
     """The network of an elaborated model, after every check."""
     read_scene: Scene | None = None
+    # what the scene observes, then what the command line asks for in its place
     if scene is not None:
         read_scene = reader.read(scene, Place(elaborator.source, scene.name.span))
     if outputs is not None:
@@ -147,13 +149,16 @@ def _build_network(
             reader.command(source, trace, SceneReader.trace)
     if _unread(elaborator, scene):
         return None  # what is missing would be found missing again, in other words
+    # states that the text does not name: ranges of tables, integrals that are read, rates along expressions
     stopping.watch_tables(elaborator, reader.observations)
     elaborator.quadratures()
     elaborator.add_derivatives()
+    # rules that need no numbers
     checks.run(elaborator, report, required=required)
     checks.set_valued_results(elaborator, reader.observations, report)
     exact_claims(elaborator, report)
     _begin(elaborator, read_scene)
+    # from here with the numbers of parameters: events of arrays one by one, sizes, the graph
     known = Values(elaborator.parts.parameters, reader.elements)
     if not report.failed and not _incomplete(report):
         switches.expand_events(elaborator, known)
@@ -161,6 +166,7 @@ def _build_network(
     if not report.failed and not _incomplete(report):
         graph_checks.run(elaborator, known, nodes_read(elaborator.parts), report)
         floating(elaborator, reader.observations, report)
+    # laws are judged on the finished network, in which alike sizes have one name
     found = with_literal_ranges(with_common_sizes(_result(elaborator, reader, read_scene)), known.number)
     laws.run(found, known, report)
     return None if report.failed or _incomplete(report) else found
@@ -179,22 +185,28 @@ def _elaborate(
     files = FileScope(document.file, report)
     elaborator = Elaborator(files, model, report)
     elaborator.moved = frozenset(moved)
+    # names of the model first: scene and command line refer to them
     elaborator.names()
     reader = SceneReader(elaborator)
     given = [s for name, value in settings for s in _set(name, value, report)]
+    # the levels that the scene chooses, before instances are made
     if scene is not None:
         reader.levels(scene)
     for source, statement in given:
         reader.command(source, statement, SceneReader.set_input)
+    # the command line wins over the scene
     for path, name in levels:
         text = SourceText("--level", f"{path}={name}")
         elaborator.levels[path] = (name, text.place(0, len(text.text)))
+    # components, with their nodes and branches
     elaborator.elements()
     _unused_levels(elaborator, report)
+    # values of parameters: the scene's, then the command line's
     if scene is not None:
         reader.settings(scene)
     for source, statement in given:
         reader.command(source, statement, SceneReader.set_parameter)
+    # laws and definitions, which read the values
     elaborator.settle()
     elaborator.statements()
     return elaborator, reader
@@ -273,6 +285,7 @@ def _unused_levels(elaborator: Elaborator, report: Report) -> None:
 
 
 def _result(elaborator: Elaborator, reader: SceneReader, scene: Scene | None) -> Network:
+    """The network as frozen tuples, from what the elaborator and the scene's reader have gathered."""
     whole = elaborator.resolver.whole
     parts = elaborator.parts
     return Network(
@@ -326,6 +339,7 @@ def _incomplete(report: Report) -> bool:
 def constant(document: Document, text: str, dimension: Dimension, name: str, report: Report) -> float | None:
     """A constant expression of the command line in SI; a bare number is in SI units; None after reporting."""
     source = SourceText(name, f"const value = {text}\n")
+    # `--at ""`
     if not text.strip():
         report.error("E207", f"{name}: a value is missing", source.place(0, 0))
         return None
@@ -333,6 +347,7 @@ def constant(document: Document, text: str, dimension: Dimension, name: str, rep
     file, problems = parse(source)
     inner.extend(problems)
     items = [i for i in file.items if isinstance(i, syntax.Const)]
+    # a text that is no single expression, as `1; const b = 2`
     if inner.failed or "\n" in text or len(items) != 1 or len(file.items) != 1:
         unit = common(dimension) if dimension else ""
         report.extend(replace(d, help=f"one expression: 3 {unit}") if d.code == "E113" else d for d in inner)
@@ -343,6 +358,7 @@ def constant(document: Document, text: str, dimension: Dimension, name: str, rep
     resolver = Resolver(report)
     with deep(), ex.fresh(), resolver.space(_space(document, source)):
         try:
+            # a bare number is in SI units: `--at 3`
             if isinstance(value.operand if isinstance(value, syntax.Negative) else value, syntax.Number):
                 return resolver.scalar(value).node.data  # type: ignore[no-any-return]
             node = resolver.scalar_of(value, dimension, "E208", f"{name} is in {{}}, wants {common(dimension)}")

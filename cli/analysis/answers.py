@@ -64,6 +64,7 @@ def answers(linear: Linear) -> tuple[Answer, ...]:
 
 
 def _answer(linear: Linear, transfer: Transfer, low: float, high: float, end: float) -> Answer:
+    """Frequency response, margins and step response of one transfer function."""
     time, step = responses.step(linear.reduced, transfer, end)
     return Answer(
         linear.outputs[transfer.output],
@@ -132,6 +133,7 @@ def locus(request: Request, name: str, along: Sequence[float], *, rest: bool, fo
 
 
 def _eigenvalues(request: Request, name: str, value: float, *, rest: bool) -> tuple[NDArray[np.complex128] | None, str]:
+    """Eigenvalues where a parameter has another value, or why there are none."""
     settings = (*((n, v) for n, v in request.settings if n != name), (name, repr(value)))
     report = Report()
     with ex.fresh():

@@ -78,17 +78,21 @@ def compile_target(
         levels=request.levels,
         moved=named,
     )
+    # as the scene has it, or with the outputs that are asked for
     network = read(report=inner, outputs=outputs)
     prepared: Prepared | None = None
+    # inputs that move get rates, and what the caller wants observed is added
     if network is not None:
         moves = _moving(network, named)
         with moving(moves):
             asked = also(network) if also is not None else ()
+            # read again: more is observed, or formulas have a parameter added
             if asked or moves:
                 names = network.traced
                 unasked = frozenset(asked).difference(names)
                 more = (*names, *(name for name in asked if name not in names))
                 network = read(report=Report(), outputs=more) or network
+            # no time passes here: states that measure and expectations are left out
             network = replace(drop_measuring_states(network), statics=(), expectations=(), goldens=())
             network = _with_rates(network, moves)
             prepared = prepare(network, inner, formulation=request.formulation, backend=request.backend, gather=False)
@@ -163,17 +167,21 @@ def model_at_instant(found: Found, request: Request, report: Report) -> tuple[Fo
     asked = load.constant(found.target.document, request.until or "", dim.TIME, "--at", report)
     if asked is None:
         return None, None
+    # before the scene's start
     if asked < found.state.t:
         raise UsageError(f"--at {asked:g} s lies before the start, {found.state.t:g} s")
+    # the start itself
     if asked == found.state.t:
         return found, None
     options = options_of(request, found.target, found.prepared, report, time.monotonic(), None)
     if options is None:
         return None, None
+    # as `simulate` runs it, up to the instant
     options = replace(options, stops=stops(found.prepared, options, report))
     events = plan(found.prepared, found.system, rest=rest(options))
     options = replace(options, events=turning(events, found.prepared, options))
     assert found.started is not None
+    # the run may need a form that does not exist, an option that does not fit, or stop before
     try:
         system, state = arrival(found.system, found.state, found.started.facts, options)
     except NoSuchForm as error:

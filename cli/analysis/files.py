@@ -85,6 +85,7 @@ def _pairs(value: NDArray[Any]) -> NDArray[np.float64]:
 
 
 def _mat(linear: Linear) -> bytes:
+    """The linearisation as a MATLAB file of level 5, the same bytes each time."""
     from scipy.io import savemat
 
     found: dict[str, Any] = dict(arrays(linear))

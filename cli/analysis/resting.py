@@ -85,10 +85,12 @@ class Equilibrium:
         return "\n".join(lines)
 
     def _judgement(self) -> str:
+        """The verdict on stability in words, with the test that decided it."""
         if self.judged is None:
             return f"stability unknown: {self.why}"
         by = {"linearisation": "by the eigenvalues (Lyapunov's indirect method)", "energy": "by the energy test"}
         energy = self.judged.energy if self.judged.stability != "asymptotically stable" else None
+        # what the potential is there, where eigenvalues do not decide
         kind = (
             ""
             if energy is None
@@ -112,6 +114,7 @@ def equilibria(
     """
     began = 0.0
 
+    # the time that is left, by the time that the tried points took
     def advance(tried: int) -> None:
         """So many points of all; the time left by those that were tried."""
         nonlocal began
@@ -121,6 +124,7 @@ def equilibria(
             whole, spent = tried / (tries + 1), now - began
             progress(whole, spent * (1.0 - whole) / whole if spent > 1.0 else None)
 
+    # compiled whole, with the efforts of nodes observed
     made = compile_target(request, report, (), of_nodes, (), still)
     if made is None:
         return None
@@ -149,12 +153,14 @@ def _efforts(here: Found) -> dict[str, tuple[float, Unit]]:
 
 
 def _equilibrium_of(found: Found, rest: Rest) -> Equilibrium:
+    """A state of rest with its unknowns by name, and the verdict on its stability or why there is none."""
     here = model_at_rest(found, rest)
     system = here.system
     n = system.form.written
     names = dict(zip(system.unknown_names[:n], map(float, rest.state.y), strict=True))
     kinds = tuple(map(str, system.kinds[:n]))
     units = tuple(system.description.families[int(k)].unit for k in system.family_of[:n])
+    # a controller that acts at instants
     sampled = next((e.name for e in found.prepared.network.events if e.period is not None), None)
     if sampled is not None:
         return Equilibrium(rest, names, kinds, units, None, f"eigenvalues do not know what '{sampled}' does")
@@ -162,6 +168,7 @@ def _equilibrium_of(found: Found, rest: Rest) -> Equilibrium:
         small = linearise(here, ()).reduced
     except NoLinearisation as error:
         return Equilibrium(rest, names, kinds, units, None, str(error))
+    # the energy test needs a potential of displacements
     primal = found.prepared.formulation in ("lagrangian", "hamiltonian")
     with np.errstate(all="ignore"):
         energy = energy_at(system, rest.state) if primal else None

@@ -60,12 +60,14 @@ def resting(
     events = plan(prepared, system)
     guess = _guess(system, t0, events)
     tangible = {c.name for c in prepared.compiled.energies.coordinates if c.tangible}
+    # every rate zero; contacts may hold or be open, sampled values stay as they are
     equations: Equations = Resting(system, tangible, t0, guess)
     if events.contacts:
         equations = ContactRest(system, tangible, t0, guess, events)
     if events.sampled:
         equations = SampledRest(equations, system, events.sampled)
     states = rests(equations, tries, most, advance)
+    # the guess where nothing was found
     state = states[0].state if states else ConsistentState(t0, guess, np.zeros_like(guess), (), np.inf)
     if states:
         states[0].stand(system)

@@ -88,13 +88,16 @@ def _check_unmet(unmet: str) -> None:
 
 def _trace_or_raise(ran: Ran | None, report: Report, unmet: str) -> Trace:
     """The trace of a run that came to its end, or what stopped it."""
+    # the text or the start is wrong
     if ran is None or ran.exit == 1:
         raise ModelError(report.diagnostics)
+    # the solver stopped
     if ran.outcome.failure is not None:
         raise ran.outcome.failure
     trace = ran.outcome.traced
     for text in ran.outcome.warnings:
         warnings.warn(text, stacklevel=3)
+    # ended, and not met: raised, or warned of
     if ran.outcome.judgement is not None and not ran.outcome.met:
         found = NotMet(trace, ran.outcome.judgement.not_met, report.diagnostics)
         if unmet == "raise":
@@ -167,12 +170,15 @@ class Model:
         from sysdyn.cli.sweep.study import line, study
         from sysdyn.cli.sweep.sweeping import axes_of, sweep
 
+        # the model that is loaded, unless the end is another
         request = replace(self._loaded.request, output=None, **_changes({} if until is None else {"until": until}))
         runner = Runner(request, keep, loaded=self._loaded if until is None else None)
         axes = axes_of(runner, tuple(line(name, value) for name, value in by_name("over", over).items()))
+        # numbers as they are given, with errors that name them
         counts = {"runs": runs, "seed": seed, "jobs": jobs}
         counts = {name: n if n is None else int(_number(name, n, int)) for name, n in counts.items()}
         asked = study(axes, sample, counts["runs"], counts["seed"] or 0)
+        # in memory: a file that goes with the folder
         with tempfile.TemporaryDirectory(prefix="sysdyn-") as folder:
             file = Path(output) if output is not None else Path(folder) / "sweep.h5"
             sweep(request, asked, file, counts["jobs"] or 1, _silent, timings=True, keep=keep, dask=dask, runner=runner)
@@ -301,6 +307,7 @@ def _changes(options: dict[str, Any]) -> dict[str, Any]:
     given = dict(options)
     given |= {name: written(name, given[name]) for name in _TEXTS & given.keys() if given[name] is not None}
     level = given.pop("level", None)
+    # a mapping of paths to levels, or pairs
     if level is not None:
         pairs = (
             list(level.items())
@@ -312,15 +319,18 @@ def _changes(options: dict[str, Any]) -> dict[str, Any]:
         if any(not isinstance(p, tuple) or list(map(type, p)) != [str, str] for p in pairs):
             raise UsageError(f"level {shortly(level)}: paths with the names of their levels")
         given["levels"] = tuple(pairs)
+    # numbers are SI, texts have units
     for name in ("until", "max_wall", "step"):
         if given.get(name) is not None:
             given[name] = text_of(given[name])
+    # tolerances and counts
     for name, kind in _NUMBERS.items():
         if given.get(name) is not None:
             given[name] = _number(name, given[name], kind)
     at = given.get("at")
     if at is not None and not isinstance(at, str):
         given["at"] = ",".join(text_of(t) for t in _instants(at))
+    # names of the command line are understood too
     if "o" in given:
         given["output"] = given.pop("o")
     if "no_timings" in given:

@@ -212,10 +212,12 @@ def compile_model(
     check_choices(formulation, backend, index)
     scene, model = (name if name is None else written("scene or model", name) for name in (scene, model))
     report, request = Report(), Request(written("path", path), scene, model, backend=backend, no_prune=no_prune)
+    # nodes of the text go with it
     with ex.fresh():
         network = network_of(request, report)
         report.raise_if_failed()
         assert network is not None
+        # auto: by the statements of the model
         wanted = None if formulation == "auto" else formulation
         prepared = prepare(network, report, formulation=wanted, backend=backend, prune=not no_prune)
         if prepared is not None:

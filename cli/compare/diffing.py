@@ -168,6 +168,7 @@ def as_json(verdict: Verdict) -> dict[str, Any]:
 
 
 def _object(c: Compared) -> dict[str, Any]:
+    """A compared quantity as an object of --json."""
     w = c.worst
     return {
         "name": c.name,

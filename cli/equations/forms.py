@@ -67,6 +67,7 @@ def content_of(target: Target, prepared: Prepared, form: str, request: Request, 
 
 
 def _content(target: Target, prepared: Prepared, form: str, request: Request, report: Report) -> Content | None:
+    """Functions, equations and matrices of one form; NoSuchEquations where the model does not have it."""
     compiled = prepared.compiled
     algebra = algebra_of(compiled.form, [p.name for p in compiled.network.parameters if not p.shape])
     match form:
@@ -81,6 +82,7 @@ def _content(target: Target, prepared: Prepared, form: str, request: Request, re
         case "port_hamiltonian":
             function, view = written(algebra, port_hamiltonian(compiled.energies, compiled.form))
             return Content((function,), matrices=view)
+        # by class, with the transforms of T* and V beside
         case "efforts":
             found = tuple(classes(algebra, compiled.energies, compiled.form))
             beside, _ = legendre_transform(compiled.energies, compiled.network.parameters)
@@ -94,6 +96,7 @@ def _content(target: Target, prepared: Prepared, form: str, request: Request, re
             return Content(equations=shown)
         case "linear":
             return _linear(target, prepared, request, report)
+        # the descriptor form, up to a number of rows
         case _:
             rows = sum(r.block in WORDS for r in compiled.form.rows) - MOST
             return Content(
@@ -133,6 +136,7 @@ def _linear(target: Target, prepared: Prepared, request: Request, report: Report
         return None
     inputs = inputs_of(target, prepared, None)
     try:
+        # where the reduced states are unknowns, these are outputs too: their own D and D1 tell them from the states
         places = linearise(found, inputs).reduced.places
         watched = places[places >= 0]
         small = linearise(found, inputs, watched=watched.tolist()).reduced
@@ -140,14 +144,17 @@ def _linear(target: Target, prepared: Prepared, request: Request, report: Report
         raise NoSuchEquations(str(error)) from error
     system, count_ = found.system, watched.size
     d, d1 = (np.zeros((places.size, len(inputs))) for _ in range(2))
+    # x of the state z = x - D u - D1 u'
     d[places >= 0], d1[places >= 0] = (m[m.shape[0] - count_ :] for m in (small.d, small.d1))
     nodes = [
         unknown_node(system, int(k)) if k >= 0 else var(name, "s") for k, name in zip(places, small.names, strict=True)
     ]
     own = [tuple(map(const, map(float, at))) for _, at in inputs]
+    # inputs and their rates, as far as they occur
     controls = [var(name, "s", *at, order=k) for k in range(3) for (name, _), at in zip(inputs, own, strict=True)]
     slopes = np.hstack([small.a, small.b - small.a @ d, d - small.a @ d1, d1])
     a, b, c, c1 = (np.abs(part) for part in (small.a, small.b, d, d1))
+    # what cancels to round-off is no term
     sizes = np.hstack([a, b + a @ c, c + a @ c1, c1])
     slopes = np.where(np.abs(slopes) > ROUND_OFF * sizes, slopes, 0.0)
     lines = []

@@ -129,6 +129,7 @@ class Typesetter:
         return body
 
     def _node(self, node: Node, args: list[tuple[str, int]]) -> tuple[str, int]:
+        """MathML of a node with its strength, from those of its arguments."""
         texts = [text for text, _ in args]
         match node.op:
             case "const":
@@ -156,11 +157,13 @@ class Typesetter:
 
     def typeset_unknown(self, family: str, kind: str, order: int, index: Sequence[str] = ()) -> str:
         """An unknown: x, its rates dotted, momenta p, multipliers κ and μ; of branches and nodes their own e f q p."""
+        # of a branch or node: the letter with its owner below
         if kind[0] in "nb" and len(kind) == 2:
             return _quantity_of(kind[1], family, index, order)
         if family.startswith("#"):
             family = family.lstrip("#")
         match kind:
+            # rates of displacements are dotted; in the complementary family they are momenta
             case "q" | "f" if family in self._coordinates:
                 order += kind == "f"
                 if self._complementary:
@@ -203,6 +206,7 @@ def _parenthesize(piece: tuple[str, int], strength: int) -> str:
 
 
 def _sum(node: Node, args: list[tuple[str, int]]) -> str:
+    """MathML of a sum, positive terms first."""
     constant, coefficients = node.data
     pieces: list[str] = []
     parts = [(c, _parenthesize(a, PRODUCT)) for c, a in zip(coefficients, args, strict=True)]
@@ -228,10 +232,12 @@ def _coefficient(value: float) -> str:
 
 
 def _product(node: Node, args: list[tuple[str, int]]) -> str:
+    """MathML of a product: a fraction where there are negative exponents."""
     above: list[str] = []
     below: list[str] = []
     for e, piece in zip(node.data, args, strict=True):
         text, size = piece[0], abs(e)
+        # one factor above or below the bar needs no parentheses
         alone = sum((x < 0) == (e < 0) for x in node.data) == 1 and any(x < 0 for x in node.data)
         if size == 0.5:
             text = f"<msqrt>{text}</msqrt>"
@@ -252,6 +258,7 @@ def _juxtapose(pieces: list[str]) -> str:
 
 
 def _function(node: Node, args: list[tuple[str, int]]) -> tuple[str, int]:
+    """MathML of conditions, comparisons, reductions, tables and functions."""
     texts = [text for text, _ in args]
     match node.op:
         case "cond":

@@ -216,7 +216,7 @@ class _Reduction:
         return Trial(candidate.label, how, candidate.activity, candidate.share, error, not reason, reason)
 
     def _target(self, text: str, report: Report | None = None) -> Target | None:
-        """The same model and scene in another text; imports and tables are found beside the file."""
+        """Model and scene of the target in another text; imports and tables are found beside the file."""
         inner = Report() if report is None else report
         document = load.document(SourceText(self.target.document.file.source.name, text), inner)
         scene = self.target.scene.name.name if self.target.scene else None

@@ -58,7 +58,7 @@ class Start:
         return {name: getattr(self, name) for name in names}
 
     def with_values(self, values: NDArray[np.float64]) -> Start:
-        """The same statement with other values."""
+        """The statement with other values."""
         return Start(self.family, self.positions, values, self.fixed, self.label, self.file, self.line, self.place)
 
 
@@ -91,17 +91,21 @@ def bind(
 ) -> Binding:
     """All numbers for one set of parameter values."""
     parameters = Parameters(network, overrides or {})
+    # what the form was built on holds for these numbers
     check_slopes(network, parameters)
     owners = _owners(form, parameters)
     _refuse_outside(model, owners, parameters, network.place)
     bind_covers(form.covers, owners, parameters)
+    # initial values before constants: these follow from them
     starts = _starts(form, owners, parameters)
     offsets = offsets_of(form, owners, starts, parameters)
     p, where = _layout(program, network, parameters, offsets)
+    # the values of parameters become views of p
     for name in (q.name for q in network.parameters if q.shape):  # what a large model has is held once
         values, at = parameters.values[name], where[name]
         parameters.values[name] = p[at : at + values.size].reshape(values.shape)
     ix = integers(program.slots, owners, parameters, where, network)
+    # integrated constraints: row, place and number of their constants
     rows = {(r.owner, r.block): k for k, r in enumerate(form.rows)}
     constants = tuple((rows[o.label, "phi"], where[o.name], offsets[o.name].size) for o in form.offsets)
     return Binding(
@@ -186,6 +190,7 @@ def offsets_of(
 ) -> dict[str, NDArray[np.float64]]:
     """Constants of integrated constraints: B q0 at the initial displacements (0 where none is written)."""
     held: dict[tuple[str, str], NDArray[np.float64]] = {}
+    # initial displacements and momenta, as arrays over their families
     for k, family in enumerate(form.families):
         if family.kind in ("q", "p"):
             held[family.owner, family.kind] = np.zeros(extents(owners[family.owner]))
@@ -194,6 +199,7 @@ def offsets_of(
                     held[family.owner, family.kind].flat[start.positions] = start.values
     found: dict[str, NDArray[np.float64]] = {}
 
+    # the expressions of constants read these arrays
     def lookup(node: Node, args: list[Value]) -> Value:
         if node.op == "time":
             return parameters.start
@@ -203,6 +209,7 @@ def offsets_of(
             return held[node.data[:2]].flat[positions(box, whole) if box else 0]
         return parameters.lookup(node, args)
 
+    # a sum over the terms of each constraint, each over its loops
     for offset in form.offsets:
         box = owners[offset.label]
         total = found.setdefault(offset.name, np.zeros(int(np.prod(extents(box)))))

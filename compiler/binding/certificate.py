@@ -119,16 +119,21 @@ class _Judge:
     def _branch(
         self, b: Branch, law: Node, network: Network, controlled: list[tuple[str, Node, Place]]
     ) -> Iterator[Finding]:
+        """Findings on a branch by its kind; what controlled sources deliver is appended to `controlled`."""
         own = ex.var(b.name, "bf" if b.side == "e" else "be", *b.at)
         name = b.name.partition("#")[0]
+        # e f >= 0 on its own
         if b.kind == "dissipator":
             yield self._judge_sign(name, law, own, b.place)
         elif b.kind in ("effort", "flow"):
             read = {n for n in ex.variables(law) if n.op == "var"}
+            # V(t): a port of the system
             if not read:
                 yield Finding(name, "port", "structure", "a source that follows time and parameters", b.place)
+            # e = -R f written as a source
             elif read == {own}:
                 yield self._judge_sign(name, law, own, b.place)
+            # e = k f2: judged together with the others
             else:
                 controlled.append((name, ex.mul(law, _conjugate(b, own)), b.place))
         elif b.kind in ("kinetic", "potential"):
@@ -172,6 +177,7 @@ class _Judge:
         for energy in network.energies:
             if energy.function not in ("D", "G"):
                 continue
+            # D of flows, G of efforts; f too, which a displacement's rate is in a reflection
             kinds = ("f", "nf", "bf") if energy.function == "D" else ("e", "ne", "be", "f")
             own = sorted(
                 (n for n in ex.variables(energy.expression) if n.op == "var" and _is_rate(n, kinds)),
@@ -182,10 +188,13 @@ class _Judge:
             inner = ex.substitute(energy.expression, dict(rates))
             slopes = {n: derivative(inner, v) for n, v in rates.items()}
             still = ex.substitute(energy.expression, dict.fromkeys(own, ex.const(0.0)))
+            # friction against a moving belt: power comes in through the belt
             if own and not ex.is_const(still, 0.0) and self._sliding(energy.expression):
                 yield Finding(name, "port", "structure", "what it slides on moves", energy.place)
+            # one variable: the sign of its slope
             if len(own) == 1:
                 yield self._judge_sign(name, slopes[own[0]], rates[own[0]], energy.place)
+            # several: a quadratic form, or samples
             elif own:
                 yield self._quadratic(name, inner, list(rates.values()), energy.place)
 
@@ -207,6 +216,9 @@ class _Judge:
         return self._sample_power(name, [power], place)
 
     def _works(self, network: Network, controlled: list[tuple[str, Node, Place]]) -> Iterator[Finding]:
+        """Findings on works, each summand of an effort by what it reads; those of other unknowns are appended to
+        `controlled`.
+        """
         given = {u.name for u in network.unknowns}
         for work in network.works:
             name = f"work of line {_line(work.place)}"
@@ -218,10 +230,13 @@ class _Judge:
             for effort in summands(work.effort):
                 effort = _explicit(effort, network, given)
                 read = {n for n in ex.variables(effort) if n.op == "var"}
+                # -c sign(v)
                 if sliding := self._sliding(effort):
                     yield self._friction(name, effort, sliding, work.place)
+                # F(t)
                 elif not read:
                     yield Finding(name, "port", "structure", "it follows time and parameters", work.place)
+                # an implicit effort: its gamma says what it does
                 elif any(n.data[1] == "e" and n.data[0] in given for n in read):
                     yield self._implicit(name, effort, rate, network, work.place)
                 elif not read <= {work.on}:  # the effort of one displacement along itself has a potential

@@ -46,14 +46,17 @@ def _product(a: Bounds, b: Bounds) -> Bounds:
 
 
 def _power(a: Bounds, exponent: float) -> Bounds:
+    """Bounds of x^exponent, a number: whole powers of either sign, others of what is not negative."""
     low, high = a
     around = (low <= 0.0) & (high >= 0.0)
     with np.errstate(all="ignore"):
         if exponent == round(exponent):
             found = _hull(low**exponent, high**exponent)
+            # an even power of a range around zero is least at zero
             if exponent > 0:
                 least = np.where(around & (exponent % 2 == 0), 0.0, found[0])
                 return least, found[1]
+            # a pole within
             return np.where(around, -np.inf, found[0]), np.where(around, np.inf, found[1])
         found = _hull(np.maximum(low, 0.0) ** exponent, np.maximum(high, 0.0) ** exponent)
     return found
@@ -82,16 +85,20 @@ def _wave(a: Bounds, shift: float) -> Bounds:
 
 
 def _bounds_of_call(name: str, args: list[Bounds]) -> Bounds:
+    """Bounds of a function of the language over bounds of its arguments; unbounded where it is not known."""
     a = args[0]
+    # monotone: the ends
     if name in _RISING:
         with np.errstate(all="ignore"):
             found = _RISING[name]
             return _hull(found(a[0]), found(a[1]))
     if name in ("sin", "cos"):
         return _wave(a, 0.5 * np.pi if name == "sin" else 0.0)
+    # falling: the ends, exchanged
     if name == "acos":
         with np.errstate(all="ignore"):
             return _hull(np.arccos(a[0]), np.arccos(a[1]))
+    # even: least at zero where that lies within
     if name in ("abs", "cosh"):
         size = np.maximum(np.abs(a[0]), np.abs(a[1]))
         least = np.where((a[0] <= 0.0) & (a[1] >= 0.0), 0.0, np.minimum(np.abs(a[0]), np.abs(a[1])))
@@ -100,6 +107,7 @@ def _bounds_of_call(name: str, args: list[Bounds]) -> Bounds:
     if name in ("min", "max"):
         pick = np.minimum if name == "min" else np.maximum
         return pick(a[0], args[1][0]), pick(a[1], args[1][1])
+    # within one period the value moves with its argument, else anything below the period
     if name == "mod":
         b = args[1]
         with np.errstate(all="ignore"):
@@ -135,6 +143,7 @@ def _truth(node: Node, args: list[Bounds]) -> Bounds:
 
 
 def _bounds_of_node(node: Node, args: list[Bounds], outlines: Mapping[str, Outline]) -> Bounds:
+    """Bounds of a node by interval arithmetic; tables of one argument by their own outline."""
     match node.op:
         case "sum":
             low = high = np.full_like(args[0][0], node.data[0])
@@ -150,6 +159,7 @@ def _bounds_of_node(node: Node, args: list[Bounds], outlines: Mapping[str, Outli
             return _power_by_interval(*args)
         case "call":
             return _bounds_of_call(node.data, args)
+        # the branch that is sure, else the hull of both
         case "cond":
             (never, sure), then, other = args
             low = np.where(never == 1.0, then[0], np.where(sure == 0.0, other[0], np.minimum(then[0], other[0])))
@@ -213,7 +223,7 @@ def _as_arrays(node: Node, args: Sequence[Range]) -> Range:
 
 
 def _single(node: Node, args: Sequence[Range]) -> Range | None:
-    """The same in plain numbers, where few operations do (most laws are such): arrays of one take ten times as long."""
+    """Bounds in plain numbers, where few operations do (most laws are such): arrays of one take ten times as long."""
     if node.op == "sum":
         low = high = node.data[0]
         for c, (a, b) in zip(node.data[1], args, strict=True):
@@ -222,11 +232,14 @@ def _single(node: Node, args: Sequence[Range]) -> Range | None:
     if node.op == "mul":
         found: Range | None = None
         for e, (low, high) in zip(node.data, args, strict=True):
+            # a factor
             if e == 1.0:
                 factor = _least_and_largest((low, high))
+            # a divisor: unbounded where zero lies within
             elif e == -1.0:
                 pole = low <= 0.0 <= high
                 factor = (-np.inf, np.inf) if pole else _least_and_largest((1.0 / low, 1.0 / high))
+            # other powers take the general way
             else:
                 return None
             if found is None:

@@ -70,8 +70,10 @@ def instants(
     """
     search = _Search(binding.parameters, t0, t1)
     try:
+        # jumps and kinks of what is integrated and of what events read
         for watched in _watched_operations(form, {t.name: t for t in tables}, read):
             search.add(watched)
+        # events at instants: affine ones a step finds by itself
         for node in crossed:
             if _in_time_alone(node) and _degree((node,)) > 1:
                 search.add(_zeros(node, (node,)))
@@ -132,6 +134,7 @@ def _watched_operations(form: DescriptorForm, tables: dict[str, Table], read: Se
     while stack:
         root, nest = stack.pop()
         for node in topological_unbound([root]):
+            # the body of a reduction under its own loop
             if node.op == "reduce":
                 first, last, body = node.args
                 stack.append((body, (*nest, Loop(node.data[1], first, last))))
@@ -146,6 +149,7 @@ def _watches_of(node: Node, tables: dict[str, Table]) -> Iterator[Watched]:
     """What is watched of a node; nothing where it does not depend on time alone."""
     if not any(_in_time_alone(a) for a in node.args):
         return
+    # kinks at breakpoints, in each argument that follows time
     if node.op == "table":
         table = tables.get(node.data[0])
         for argument, points in zip(node.args, table.points if table else (), strict=False):
@@ -156,13 +160,16 @@ def _watches_of(node: Node, tables: dict[str, Table]) -> Iterator[Watched]:
         return
     if not all(_in_time_alone(a) or not variables(a) for a in node.args):
         return
+    # where two sides are equal
     if node.op == "cmp" or (node.op == "call" and node.data in ("min", "max")):
         yield Watched(node, node.args, lambda v: np.sign(v[0] - v[1]), np.zeros(1), ())
     elif node.op == "call" and node.data in ("step", "abs", "sign"):
         yield _zeros(node, node.args)
+    # at whole numbers
     elif node.op == "call" and node.data in ("floor", "ceil"):
         rounded = np.floor if node.data == "floor" else np.ceil
         yield Watched(node, node.args, lambda v: np.asarray(rounded(v[0])), None, ())
+    # at whole quotients
     elif node.op == "call" and node.data == "mod":
         yield Watched(node, node.args, lambda v: np.floor(v[0] / v[1]), None, ())
 
@@ -235,6 +242,7 @@ class _Search:
         number = len(next(iter(columns.values()))) if columns else 1
         if number == 0:
             return
+        # arrays of very many elements
         if 2 * number > BUDGET:
             self.note = f"instants in the text of {number} elements are not searched for: they are integrated through"
             return
@@ -243,12 +251,14 @@ class _Search:
             brackets = self._affine(watched, labels, number) or self._bracket_changes(watched, labels, number)
         except KeyError:  # a constant that is known at the start only
             return
+        # what jumps at the start itself is an instant there
         start = self.t0 + ROUND_OFF * (self.t1 - self.t0)
         found = labels.bisect(*brackets, start)
         near = found <= start  # the start lies on its own right side
         found = found[~near & (found <= self.t1)]
         if near.any() and labels.jumps(np.arange(number), self.t0, self.t0 + 1e-6 * (self.t1 - self.t0)):
             found = np.append(found, self.t0)
+        # one node may stand under several nests
         found = distinct(found)
         before = self._found.get(watched.node, found)
         self._found[watched.node] = distinct(before, found)
@@ -261,6 +271,7 @@ class _Search:
         if _degree(arguments[:1] if whole else arguments) > 1 or (whole and _degree(arguments[1:]) > 0):
             return None
         every = np.arange(number)
+        # linear in time: the values at both ends tell all crossings
         ends = [labels.measure(every, np.full(number, t), quotient=whole) for t in (self.t0, self.t1)]
         slope = (ends[1] - ends[0]) / (self.t1 - self.t0)
         low, high = np.minimum(*ends), np.maximum(*ends)
@@ -268,6 +279,7 @@ class _Search:
             return None
         which: list[Whole] = []
         level: list[Array] = []
+        # floor, ceil, mod: every whole number between
         if watched.levels is None:
             first, count = np.floor(low), np.maximum(np.ceil(high) - np.floor(low) + 1.0, 0.0)
             if count.sum() > 4 * MOST + 4 * number:
@@ -276,6 +288,7 @@ class _Search:
                 take = every[k < count]
                 which.append(take)
                 level.append(first[take] + k)
+        # given levels: breakpoints, zero
         else:
             for value in watched.levels:
                 take = every[(low <= value) & (value <= high)]
@@ -286,6 +299,7 @@ class _Search:
         index, at = index[moving], at[moving]
         if index.size > 4 * MOST + 4 * number:
             raise _TooManyError
+        # by division, then a bracket of some roundings around it
         t = self.t0 + (at - ends[0][index]) / slope[index]
         around = 1e-12 * np.maximum(max(abs(self.t0), abs(self.t1)), np.abs(t))
         return index, np.maximum(t - around, self.t0), np.minimum(t + around, self.t1)

@@ -64,6 +64,7 @@ def where(place: Place | None) -> dict[str, Any]:
 
 
 def _kernel(pattern: Pattern) -> dict[str, Any]:
+    """Entry of a kernel: loops, rows, entries of both Jacobians, and what its values read."""
     return {
         "loops": [[_bound(a), _bound(b)] for a, b in pattern.loops],
         "rows": [_reference(r) for r in pattern.rows],
@@ -144,6 +145,7 @@ def _each(name: str, box: Extents, authors: Authors) -> list[dict[str, Any]]:
 
 
 def _unknowns(form: DescriptorForm, program: Program, binding: Binding, authors: Authors) -> list[dict[str, Any]]:
+    """Entries of all unknowns, element by element: name, kind, unit, and whether its rate stands in an equation."""
     moving = {
         column.family
         for name, patterns in program.patterns

@@ -81,6 +81,7 @@ class Oracle:
         point = (t, y, yd)
         for kernel in self._kernels(block):
             for summand in kernel.rows:
+                # operations that can fail on finite arguments
                 nodes = [n for n in topological([summand.expression]) if n.op in ("table", "call", "pow", "mul", "sum")]
                 nodes = [n for n in nodes if not has_reduction(n)]
                 roots = (*nodes, *(a for n in nodes for a in n.args))
@@ -88,6 +89,7 @@ class Oracle:
                     continue
                 values = over(kernel.nest, roots, lambda n, a: self._leaf(n, a, point))
                 rest = iter(values[len(nodes) :])
+                # the first whose arguments are finite and whose value is not
                 for node, value in zip(nodes, values[: len(nodes)], strict=True):
                     arguments = [next(rest) for _ in node.args]
                     wrong = ~np.isfinite(value) if infinite else np.isnan(value)
@@ -110,6 +112,7 @@ class Oracle:
         return v, rows, columns
 
     def _entry(self, kernel: Kernel, k: int, column: Node, point: Point) -> tuple[Array, Array, Array]:
+        """One entry of a Jacobian over a kernel's iterations: values, rows and columns."""
         summand = kernel.rows[k]
         family = self._families[column.data[0], column.data[1]]
         slope = derivative(summand.expression, column)
@@ -127,6 +130,7 @@ class Oracle:
         return kernel if rows == kernel.rows else replace(kernel, rows=rows)
 
     def _elements(self, root: Node) -> Node:
+        """An expression whose products and extrema over ranges are written out, as derivatives want them; sums stay."""
         done: dict[Node, Node] = {}
         for node in topological_unbound([root]):
             args = tuple(done.get(a, a) for a in node.args)
@@ -152,6 +156,7 @@ class Oracle:
         return positions(box, [np.rint(a).astype(np.int64) for a in at])
 
     def _leaf(self, node: Node, args: list[Value], point: Point) -> Value:
+        """Value of a leaf at a point (t, y, y'): time, unknowns by place, constants of integrated rows, parameters."""
         t, y, yd = point
         if node.op == "time":
             return t

@@ -129,14 +129,17 @@ def _by_order(form: DescriptorForm, by: Sequence[dict[str, list[Kernel]]]) -> di
             if rows:
                 found.setdefault(order, {}).setdefault(block, []).append(Kernel(kernel.nest, rows))
 
+    # the derivative of a row by u' is the derivative of its rate by u'', and so on
     for order, slopes in enumerate(by):
         for name in slopes.keys() - {*_DERIVED, "phi"}:
             put(order, name, slopes[name])
+        # constraints by themselves, and those that were integrated from flow constraints one order lower
         put(order, "phi", slopes.get("phi", ()), own=False)
         put(order - 1, "phi", slopes.get("phi_rate", ()), own=True)
         put(order, "phi_rate", slopes.get("phi_rate", ()), own=True)
         put(order + 1, "phi_acceleration", slopes.get("phi_rate", ()), own=True)
         put(order + 2, "phi_acceleration", slopes.get("phi", ()), own=False)
+        # rates of balances follow from the rows whose rates they are
         for name, bases in RATES.items():
             for base in bases:
                 put(order + 1, name, slopes.get(base, ()), own=False if base == "phi" else None)

@@ -79,8 +79,10 @@ class Algebra:
                     done[node] = args[0] ** args[1]
                 case "call" if node.data in _NAMES:
                     done[node] = getattr(sympy, _NAMES[node.data])(*args)
+                # a signal is its value: signs of virtual work do not matter here
                 case "call" if node.data == "signal":
                     done[node] = args[0]
+                # leaves, and what sympy does not know, as symbols
                 case _:
                     done[node] = self.symbol(node)
         return done[root]
@@ -94,6 +96,7 @@ class Algebra:
         return done[root]
 
     def _one(self, part: Any, args: list[Node]) -> Node:
+        """Node of a sympy object from those of its arguments."""
         sympy = self.sympy
         if part in self._nodes:
             return self._nodes[part]

@@ -210,6 +210,7 @@ def functions(algebra: Algebra, model: EnergyModel) -> Iterator[Function]:
             parts = [(t.loops, t.expression) for t in model.function(name)]
             yield Function(name, sum_terms(algebra, parts, whole=True))
     works: dict[tuple[Nest, Node], list[Node]] = {}
+    # efforts along each coordinate that the work moves
     for work in model.works:
         for node in sorted(variables(work.on), key=lambda n: n.number):
             if node.op == "var":

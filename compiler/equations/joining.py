@@ -33,6 +33,7 @@ def collect_terms(algebra: Algebra, root: Node) -> tuple[Node, ...]:
         return ()
     whole = algebra.object(root)
     leaves = sorted((n for n in variables(root) if moving(n)), key=_leading)
+    # in rates, multipliers and flows
     polynomial = _polynomial(algebra, whole, leaves)
     if polynomial is None:  # flows inside of functions: what is linear in rates and multipliers is still apart
         leaves = [n for n in leaves if n.data[2] or n.data[1] in ("kappa", "mu")]
@@ -40,6 +41,7 @@ def collect_terms(algebra: Algebra, root: Node) -> tuple[Node, ...]:
     if polynomial is None:
         return tuple(_split(algebra, whole))
     found: list[Node] = []
+    # each monomial with its coefficient as short as it gets
     for powers, coefficient in polynomial:
         short = shortest(algebra, coefficient)
         if short == 0:
@@ -108,11 +110,13 @@ def shortest(algebra: Algebra, coefficient: Any) -> Any:
     sympy = algebra.sympy
     size = coefficient.count_ops()
     algebra.spent += size
+    # each simplification costs: large ones and late ones stay as they are
     if size > LARGEST or algebra.spent > GRANTED:
         return coefficient
     whole, held = _abstract_functions(sympy, coefficient)
     forms = [whole]
     waves = coefficient.has(sympy.sin, sympy.cos)
+    # several rewritings are tried, and the shortest wins
     ways: list[Callable[[Any], Any]] = [sympy.factor]
     if waves and _over_sums(sympy, coefficient):
         pass  # its factors are looked at one by one

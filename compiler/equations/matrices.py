@@ -63,6 +63,7 @@ def rows_of(form: DescriptorForm, *blocks: str) -> list[Row]:
     with_reactions = {"dynamics": ("dynamics", "phi_reaction", "psi_reaction")}
     found: dict[tuple[str, int], list[Node]] = {}
     for name in blocks:
+        # constraint forces stand in blocks of their own
         for part in with_reactions.get(name, (name,)):
             block = form.block(part)
             for kernel in block.kernels if block is not None else ():
@@ -172,6 +173,7 @@ def _solve_rows(algebra: Algebra, rows: Sequence[Row], wanted: Sequence[Node]) -
     sympy = algebra.sympy
     still = dict.fromkeys(wanted, const(0.0))
     matrix, right = [], []
+    # the matrix of slopes, and the right side where all unknowns are zero
     for row in rows:
         slopes = [derivative(row.expression, n) for n in wanted]
         if any(n in wanted for slope in slopes for n in variables(slope)):
@@ -200,6 +202,7 @@ def _eliminate(sympy: Any, a: Any, b: Any) -> list[Any] | None:
     pivots: list[tuple[int, int]] = []
     left = set(range(n))
     free = set(range(len(rows)))
+    # the pivot of the sparsest row, then of the shortest entry (Markowitz's order in symbols)
     while left:
         best = None
         for i in sorted(free):
@@ -215,6 +218,7 @@ def _eliminate(sympy: Any, a: Any, b: Any) -> list[Any] | None:
         left.discard(j)
         pivot = rows[i][j]
         rows[i] = [_readable(_divide_terms(sympy, v, pivot)) for v in rows[i]]
+        # Gauss-Jordan: above and below
         for k in range(len(rows)):
             factor = rows[k][j]
             if k != i and factor != 0:
@@ -227,7 +231,7 @@ def _eliminate(sympy: Any, a: Any, b: Any) -> list[Any] | None:
 
 
 def _readable(value: Any) -> Any:
-    """The same.  NoSuchEquations where it is longer than anyone reads: what follows from it takes minutes."""
+    """The value itself. NoSuchEquations where it is longer than anyone reads: what follows from it takes minutes."""
     if value.count_ops() > LONGEST:
         raise NoSuchEquations(
             f"the solution for rates and multipliers has entries of more than {LONGEST} operations: --form matrices"
@@ -263,7 +267,7 @@ def _cancel(sympy: Any, value: Any) -> Any:
 
 
 def _sines_by_cosines(sympy: Any, value: Any) -> Any:
-    """The same with squares of sines written by cosines: equal expressions become equal.  A sine that stands inside
+    """A value with squares of sines written by cosines: equal expressions become equal. A sine that stands inside
     another function, sin(w*t + a*sin(t)), stays.
     """
     if not value.has(sympy.sin):
@@ -300,6 +304,7 @@ def canonical(algebra: Algebra, model: EnergyModel, form: DescriptorForm) -> tup
     if not carriers:
         raise NoSuchEquations("no coordinate carries a momentum: there is no kinetic store")
     flows = [var(owner, "f") for owner in carriers]
+    # moving inertia of many coordinates has no short inverse
     if len(model.solved) > MOVING and any(
         n.op == "var"
         for r in rows
@@ -316,9 +321,11 @@ def canonical(algebra: Algebra, model: EnergyModel, form: DescriptorForm) -> tup
     except NoSuchEquations as error:
         raise NoSuchEquations(f"the flows do not follow from the momenta in symbols: {error}") from error
     values = {flow: algebra.node(value) for flow, value in zip(flows, solution, strict=True)}
+    # T and V with flows by momenta: H
     energy = _energy(algebra, model, [owner for owner in carriers if _reads_flow(model, owner, "T*")], values)
     function = Function("H", tuple(Summed((), t) for t in energy))
     found = [_rate(algebra, owner, values) for owner in _displacements(form)]
+    # the other rows without flows
     for row in rows_of(form, "dynamics", "phi", "psi", "gamma", "lambda"):
         left, right = sides(row.block, [Summed((), t) for t in _without_flows(algebra, row.expression, values)])
         found.append(Equation(row.block, row.owner, row.place, left, right))

@@ -103,6 +103,7 @@ class _View:
         if any(c.shape for c in model.coordinates):
             raise NoSuchEquations("families over ranges are not written out")
         m = self.m
+        # what carries energy: displacements, momenta or flows
         self.stores = coordinates_by_energy(model)
         self.carriers = {f.owner for f in form.families if f.kind == m.conjugate} & {c.name for c in model.coordinates}
         names = [c.name for c in model.coordinates]
@@ -115,6 +116,7 @@ class _View:
         constraints = [(row.kind, row.name, row.at) for row in model.rows if row.kind in ("phi", "psi")]
         if any(at for _, _, at in constraints):
             raise NoSuchEquations("families over ranges are not written out")
+        # the unknowns z: displacements, momenta or flows, multipliers, implicit efforts
         self.labels = list(dict.fromkeys((kind, name) for kind, name, _ in constraints))
         self.z = [var(n, m.coordinate) for n in self.places]
         self.first = len(self.z)
@@ -201,10 +203,12 @@ class _View:
     def _kinetic(self) -> None:
         """Q' = f and M f' or p'; the curl of the momenta."""
         m, momenta = self.m, self._momenta()
+        # q' = f: a pair of skew entries
         for name in self.places:
             q, row = self.at[var(name, m.coordinate)], self.first + self.names.index(name)
             _add(self.mass, q, q, const(1.0))
             self._add_skew(q, row, const(1.0))
+        # momenta as unknowns have a rate of their own, others M f'
         for i, name in enumerate(self.names):
             if name in self.carriers:
                 _add(self.mass, self.first + i, self.first + i, const(1.0))
@@ -214,6 +218,7 @@ class _View:
                     if other in self.carriers and not is_const(derivative(momenta[name], var(other, m.rate)), 0.0):
                         raise NoSuchEquations(f"{name} has no momentum beside that of {other}")
                     _add(self.mass, self.first + i, self.first + j, derivative(momenta[name], var(other, m.rate)))
+                # the gyroscopic terms of moving inertia
                 if j > i and other not in self.carriers:
                     curl = sub(
                         derivative(momenta.get(other, const(0.0)), var(name, m.coordinate)),
@@ -257,10 +262,13 @@ class _View:
             on = {n.data[0]: derivative(work.on, n) for n in local_variables(work.on, m.coordinate)}
             for effort in summands(substitute(work.effort, self._explicit())):
                 read = {n for n in variables(effort) if n.op == "var"}
+                # an implicit effort is an unknown
                 if any(n.data[1] == "e" and n.data[0] in self.given for n in read):
                     self._implicit(effort, on, work)
+                # by flows: dissipation or exchange
                 elif any(n.data[1] == m.rate for n in read):
                     self._by_flows(effort, on, linear)
+                # of time and displacements: an input
                 else:
                     for name, slope in on.items():
                         self.gain.setdefault((self._row(name), effort), []).append(slope)
@@ -355,6 +363,7 @@ class _View:
                 continue
             k = self.at[var(row.name, "kappa" if row.kind == "phi" else "mu")]
             kind = m.coordinate if row.kind == "phi" else m.rate
+            # the gradient stands in the balance and, against it, in the constraint's rate
             for term in row.terms:
                 if term.loops:
                     raise NoSuchEquations("sums over ranges are not written out")
@@ -363,6 +372,7 @@ class _View:
                 for node in nodes:
                     slope = substitute(derivative(held, node), signals)
                     self._add_skew(k, self._row(node.data[0]), slope)
+                # what moves it without flows: an input of the constraint
                 if row.kind == "psi":
                     moving = substitute(term.expression, {n: const(0.0) for n in nodes})
                 else:

@@ -179,6 +179,7 @@ def verify_descriptor(form: DescriptorForm) -> None:
 
 
 def _verify_summand(block: str, summand: Summand, bound: set[str], known: set[tuple[str, str]]) -> None:
+    """Assert what the contract says of a summand: known unknowns, bound indices, rates only where they may stand."""
     for node in topological((*summand.at, summand.expression)):
         if node.op == "index":
             assert node.data in bound or node.data.startswith("#r"), (block, node)
@@ -197,6 +198,7 @@ def show(form: DescriptorForm) -> str:
     """The form as text, for --dump descriptor, in the letters of its family."""
     f = form.formulation
     lines = [f"formulation {f}"]
+    # unknowns, rows, blocks, initial values
     for k, u in enumerate(form.families):
         lines.append(f"unknown {k}: {family_name(f, u.name, u.kind)} ({letter(f, u.kind)}, {u.unit})")
     for k, r in enumerate(form.rows):

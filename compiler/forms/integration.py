@@ -34,16 +34,19 @@ def integrate(model: EnergyModel) -> tuple[EnergyModel, tuple[Diagnostic, ...]]:
     """The model with integrable psi rows as phi, and a note N501 for each."""
     tangible = frozenset(c.name for c in model.coordinates if c.tangible)
     labels: dict[str, list[Row]] = {}
+    # rows of one label are integrated together or not at all
     for row in model.of_kind("psi"):
         if row.name in model.switched:
             continue  # a displacement goes on from where its flow was let go
         labels.setdefault(row.name, []).append(row)
+    # exact, and tied to what the author calls tangible
     chosen = {n for n, rows in labels.items() if _touches(rows, tangible, model.mirror) and _all_exact(rows, model)}
     if not chosen:
         return model, ()
     offsets: list[Offset] = []
     notes: list[Diagnostic] = []
     rows: list[Row] = []
+    # the row becomes a phi with a constant; a term that adds to one has none of its own
     for row in model.rows:
         if row.kind == "psi" and row.name in chosen:
             integrated, offset = _integrate_row(row, model.mirror)

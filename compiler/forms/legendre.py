@@ -76,13 +76,16 @@ def legendre_transform(model: EnergyModel, parameters: Sequence[Parameter]) -> t
     found: list[Term] = []
     rests: list[Slope] = []
     solved: dict[str, tuple[Node, Node]] = {}
+    # blocks of T* that share no flow are transformed one by one
     for block in _blocks(terms, m.rate):
         whole = add(*(terms[k].expression for k in block.terms))
         inertia = _inertia(whole, block.flows, _scalar_values(parameters))
+        # not a regular quadratic form of numbers and displacements
         if inertia is None:
             continue
         place = terms[block.terms[0]].place
         momenta = _momenta(whole, block.flows, m.conjugate)
+        # a full matrix: flows by relations in place of an inverse
         if len(inertia) > WRITTEN and not _is_diagonal(inertia):
             solved |= _flow_relations(whole, block.flows, inertia, momenta, m.conjugate)
         else:
@@ -117,12 +120,14 @@ def _blocks(terms: Sequence[Term], rate: str) -> Iterator[_Block]:
     lost: set[str] = set()
     for k, term in enumerate(terms):
         flows = dict.fromkeys(local_variables(term.expression, rate))
+        # arrays keep their coenergy
         if term.loops or any(n.args for n in flows):
             lost |= {n.data[0] for n in flows}
             continue
         if not flows:
             continue
         own, numbers, apart = flows, [k], []
+        # union of the parts that the term joins
         for part in parts:
             if part[0].keys() & own.keys():
                 own, numbers = {**part[0], **own}, part[1] + numbers
@@ -225,6 +230,7 @@ def _regular(inertia: Square, known: Values) -> bool:
     entries = [e for row in inertia for e in row]
     pivots = [row[k] for k, row in enumerate(inertia)] if _is_diagonal(inertia) else _factor_inertia(inertia)[1]
     n = len(pivots)
+    # by samples: half of them near, half far out
     for seed in range(DRAWN):
         drawn = random.Random(seed)
         ends = NEAR if seed % 2 == 0 else (-WIDE, WIDE)
@@ -243,6 +249,7 @@ def _regular(inertia: Square, known: Values) -> bool:
             found = [math.nan] * (n + n * n)
         if ends is not NEAR and any(math.isnan(v) for v in found[n:]):
             continue
+        # each pivot against the largest entry of its row
         rows = [max(abs(v) for v in found[(k + 1) * n : (k + 2) * n]) for k in range(n)]
         if not all(abs(d) > SINGULAR * row > 0.0 for d, row in zip(found, rows, strict=False)):
             return False

@@ -60,16 +60,21 @@ def lower(model: EnergyModel, formulation: str, *, legendre: bool) -> Descriptor
     carriers = stores | (inertial(model) if legendre else jumping(model))
     model = resolve_momenta(model, frozenset(carriers))
     form = _Lowering(model, stores, frozenset(carriers))
+    # rows are declared in the order of the contract, whoever adds to them
     form.declare()
     form.kinetic()
+    # efforts on each coordinate
     acting = tuple(efforts(model))
     form.efforts(acting)
     form.constraints()
+    # what is read of the run
     add_observations(form.assembly, model, form.carriers)
     stored = add_audit(form.assembly, model, acting)
+    # initial values of unknowns, and those of expressions as equations of the start
     pins, equations = pins_and_equations(model, form.carriers, form.families)
     add_initials(form.assembly, model, form.carriers, equations)
     form.families += missing(equations)
+    # a start that moves flows moves their momenta together
     if equations or form.moves_flows():
         measured = {n.data[0] for i in model.initials if i.store for n in variables(i.target) if n.op == "var"}
         form.add_momentum_rows(coordinates_of_shared_inertia(model) - carriers - measured)
@@ -78,6 +83,7 @@ def lower(model: EnergyModel, formulation: str, *, legendre: bool) -> Descriptor
     shapes += [(e.owner, loop_ranges(e.target.nest)) for e in equations]
     shapes += [(HELD + c.name, c.shape) for c in model.coordinates]
     shapes += stored
+    # the elements that the rows of one label cover
     hulls: dict[str, list[tuple[tuple[Node, ...], Nest, Place]]] = {}
     for row in model.rows:
         if row.kind != "lambda" and not row.adds:
@@ -183,6 +189,9 @@ class _Lowering:
         self.families = self._families()
 
     def _families(self) -> list[Unknowns]:
+        """Unknowns in the order of the contract: displacements, flows, momenta, states, implicit efforts, multipliers,
+        audits.
+        """
         m = self.model
         # an integrated psi makes nothing tangible, but its displacements are variables
         pieces = [t.expression for row in m.of_kind("phi") for t in row.terms]
@@ -217,6 +226,7 @@ class _Lowering:
     def declare(self) -> None:
         """All row families, in the order of the contract."""
         declare = self.assembly.family
+        # balances, momenta, constraints, rates of states
         for c in self.model.coordinates:
             declare(Equations("dynamics", c.name, c.name, "dynamics", c.units["e"], c.place))
         for c in self.model.coordinates:
@@ -245,6 +255,7 @@ class _Lowering:
         for family in self.model.coordinates:
             if family.name in self.carriers:
                 self._carrier(family)
+        # p = dT*/df as a row, or its rate in the balance
         for term in self.model.function(mirror.coenergy):
             for rate in local_variables(term.expression, mirror.rate):
                 if rate.data[0] in self.model.solved:
@@ -254,6 +265,7 @@ class _Lowering:
                     self._momentum(rate.data[0], rate.args, term.loops, neg(slope))
                 else:
                     add("dynamics", rate.data[0], rate.args, term.loops, time_derivative(slope))
+        # f = dT/dp where the author gave T
         for term in self.model.function(mirror.energy):
             for p in local_variables(term.expression, mirror.conjugate):
                 self._momentum(p.data[0], p.args, term.loops, derivative(term.expression, p))
@@ -299,6 +311,7 @@ class _Lowering:
         the start alone, as momenta that are unknowns change there.
         """
         m = self.model.mirror
+        # a row and an unknown for what the momentum misses
         for c in self.model.coordinates:
             if c.name in names:
                 owner, (nest, at) = HELD + c.name, whole(c)
@@ -306,6 +319,7 @@ class _Lowering:
                 rows = Equations("initial", c.name, owner, "initial", c.units["p"], c.place, content=True)
                 self.assembly.family(rows)
                 self.assembly.add("initial", owner, at, nest, neg(var(owner, "unsaid", *at)))
+        # dT*/df of each
         for term in self.model.function(m.coenergy):
             for rate in local_variables(term.expression, m.rate):
                 if rate.data[0] in names:

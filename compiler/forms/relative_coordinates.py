@@ -110,6 +110,7 @@ def _anchors(model: EnergyModel, function: str, kind: str, group: list[Family], 
     found = {anchor.name: _Anchor(anchor.name, tuple((k, const(0.0)) for k in range(len(anchor.shape))))}
     shapes = {c.name: c for c in group}
     joined = [local_variables(t.expression, kind) for t in model.function(function)]
+    # spread from the anchor along terms that join families
     while len(found) < len(group):
         before = len(found)
         for nodes in joined:
@@ -118,9 +119,11 @@ def _anchors(model: EnergyModel, function: str, kind: str, group: list[Family], 
                 if n.data[0] in shapes and n.data[0] not in found:
                     assert known is not None
                     places = _places(found[known.data[0]].anchor_indices(known.args), n.args)
+                    # indices that are not those of the anchor but for a shift
                     if places is None or not _inside(shapes[n.data[0]], anchor, places):
                         return {}
                     found[n.data[0]] = _Anchor(anchor.name, places)
+        # a family that no term joins to the anchor
         if len(found) == before:
             return {}
     return found

@@ -63,6 +63,7 @@ def magnitude(root: Node) -> Node:
 
 
 def _magnitude(node: Node, done: dict[Node, Node]) -> Node:
+    """Sum of the magnitudes of the terms of a node: the size against which round-off counts."""
     match node.op:
         case "const":
             return const(abs(node.data))
@@ -70,9 +71,11 @@ def _magnitude(node: Node, done: dict[Node, Node]) -> Node:
             constant, coefficients = node.data
             pairs = zip(coefficients, node.args, strict=True)
             return linear(abs(constant), ((abs(c), done[a]) for c, a in pairs))
+        # factors below are divided by their own value
         case "mul":
             pairs = zip(node.data, node.args, strict=True)
             return product(1.0, ((e, done[a] if e > 0.0 else call("abs", a)) for e, a in pairs))
+        # of the branch that holds
         case "cond":
             test, then, other = node.args
             return conditional(test, done[then], done[other])

@@ -200,6 +200,7 @@ def energies(network: Network) -> EnergyModel:
         discretes=frozenset(network.discretes),
         assigned=frozenset(_assigned_states(network)),
     )
+    # displacements that a statement reads are tangible: they stay unknowns
     touched = tangible(model)
     coordinates = tuple(replace(c, tangible=c.name in touched) for c in model.coordinates)
     return replace(model, coordinates=coordinates)

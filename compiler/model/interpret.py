@@ -59,6 +59,7 @@ def _values(nodes: Iterable[Node], lookup: Lookup) -> dict[Node, Value]:
 
 
 def _value(node: Node, args: list[Value], lookup: Lookup) -> Value:
+    """Value of a node, an array over iterations, from those of its arguments."""
     match node.op:
         case "const":
             return np.float64(node.data)
@@ -88,6 +89,7 @@ def _value(node: Node, args: list[Value], lookup: Lookup) -> Value:
             return np.logical_not(args[0])
         case "reduce":
             return _reduce(node, args, lookup)
+        # leaves and tables
         case _:
             return lookup(node, args)
 

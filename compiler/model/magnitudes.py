@@ -41,8 +41,10 @@ def _own(node: Node, value: dict[Node, Value], found: dict[Node, Value]) -> Valu
     sizes = [found[a] for a in node.args]
     relative = [_ratio(found[a], value[a]) for a in node.args]
     match node.op:
+        # terms that cancel leave the size of the terms
         case "sum":
             return abs(node.data[0]) + sum(abs(c) * s for c, s in zip(node.data[1], sizes, strict=True))
+        # relative errors add up; of a product that is zero the other factors count
         case "mul":
             if all(e == 1.0 for e in node.data):
                 return np.prod(np.broadcast_arrays(*sizes), axis=0)
@@ -50,6 +52,7 @@ def _own(node: Node, value: dict[Node, Value], found: dict[Node, Value]) -> Valu
             parts = zip(node.data, sizes, node.args, strict=True)
             factors = [s**e if e > 0.0 else np.abs(value[a]) ** e for e, s, a in parts]  # of zeros that cancel above
             return np.where(value[node] == 0.0, np.prod(np.broadcast_arrays(*factors), axis=0), own)
+        # the exponent multiplies the relative error of the base
         case "pow":
             return own * (1.0 + np.abs(value[node.args[1]]) * relative[0])
         case "call" | "table":

@@ -80,7 +80,11 @@ class Parameters:
         return [n for n in dict.fromkeys(n.data for n in nodes if n.op == "param") if n in self._known]
 
     def _bind(self, parameter: Parameter, overrides: Mapping[Override, Any]) -> None:
+        """Bind a parameter: overrides before its formula, then elements that the scene or the caller sets; E805 of
+        wrong shapes.
+        """
         name, place = parameter.name, parameter.place
+        # most parameters are a number that nothing sets
         if name not in self._given and (number := _number(parameter)) is not None:
             self.values[name] = number
             return
@@ -90,6 +94,7 @@ class Parameters:
             raise ModelError([Diagnostic("E805", text, place)])
         if parameter.shape:
             self.boxes[name] = box
+        # a number for all elements, or an array of the shape
         if name in overrides:
             values = np.asarray(overrides[name], dtype=float)
             if values.shape not in ((), extents(box)):
@@ -98,9 +103,11 @@ class Parameters:
             values = np.broadcast_to(values, extents(box)).copy()
         else:
             values = self._formula(parameter, box)
+        # elements of the scene, by their indices
         for setting in () if name in overrides else self._settings.get(name, ()):
             *at, value = evaluate((*setting.at, setting.value), self.lookup_at_place(setting.place))
             values[self._element(name, box, tuple(at), setting.place)] = value
+        # elements of the caller come last
         for key, value in overrides.items():
             if not isinstance(key, str) and key[0] == name:
                 values[self._element(name, box, key[1:], place)] = value

@@ -147,16 +147,19 @@ def evaluate(table: Table, arguments: list[Any], orders: tuple[int, ...]) -> Any
 
 
 def _bilinear(table: Table, arguments: list[Any], orders: tuple[int, ...]) -> Any:
+    """Bilinear interpolation in two arguments and its first derivatives; higher ones are zero."""
     x, z = (np.asarray(points, dtype=float) for points in table.points)
     g = np.asarray(table.values, dtype=float).reshape(len(x), len(z))
     if max(orders) > 1:
         return np.zeros(np.broadcast(*arguments).shape)
     parts = []
+    # in each argument the cell, and the weights of its two ends
     for axis, u, order in zip((x, z), arguments, orders, strict=True):
         held = np.clip(u, axis[0], axis[-1]) if table.outside != "extend" else np.asarray(u)
         i = np.clip(np.searchsorted(axis, held, side="right") - 1, 0, len(axis) - 2)
         h = axis[i + 1] - axis[i]
         pair = (1 - (held - axis[i]) / h, (held - axis[i]) / h) if order == 0 else (-1 / h, 1 / h)
+        # a clamped argument has no slope; beyond a table that stops there is no value
         live = np.where((held != u) & (order > 0), 0.0, 1.0)
         if table.outside == "stop":
             live = np.where(held != u, np.nan, live)

@@ -59,16 +59,19 @@ def _with_transformers(network: Network) -> Network:
     for b in network.branches:
         parts = None if b.on is None else _combination(b.on)
         own = b.at == loop_indices(b.loops)
+        # one displacement, or the difference of two nodes: connected without a transformer
         if parts is None or not own or _plain(parts):
             branches.append(b)
             continue
         shape = loop_ranges(b.loops)
+        # effort nodes: one point for all parts; flow nodes: a chain of points, which adds up displacements
         effort = b.domain.common == "effort"
         names = [f"{b.name}.inner{k}" for k in range(1, 2 if effort else len(parts) + 1)]
         nodes += [NodeFamily(name, shape, b.domain, b.place) for name in names]
         points = [Terminal(name, b.at) for name in names]
         ground = Terminal(None, ())
         branches.append(replace(b, on=None, plus=points[-1], minus=ground))
+        # a transformer for each part, its ratio the coefficient
         for k, (coefficient, displacement) in enumerate(parts):
             ends = (ground, points[0]) if effort else (points[k], points[k - 1] if k else ground)
             one, two = f"{b.name}.along{k + 1}#1", f"{b.name}.along{k + 1}#2"
@@ -111,14 +114,19 @@ def _connect_along_nodes(network: Network) -> Network:
 def _ends(
     b: Branch, targets: dict[str, Branch], absorbed: dict[str, list[tuple[int, Branch]]]
 ) -> tuple[Terminal, Terminal] | None:
+    """Ends of an element along a displacement of nodes or branches, None where it is none of these; absorbed: by
+    branch.
+    """
     assert b.on is not None
     parts = _combination(b.on)
     if parts is None or b.domain.common != "flow" or not all(_unit(c) for c, _ in parts):
         return None
     ground = Terminal(None, ())
+    # q of nodes: plus at one, minus at the other or the ground
     if all(n.data[1] == "nq" for _, n in parts):
         signed = {_unit(c): Terminal(n.data[0], n.args) for c, n in parts}
         return (signed.get(1, ground), signed.get(-1, ground)) if len(signed) == len(parts) else None
+    # along a branch: between that branch's own ends
     root = _root(b, targets)
     if root is None:
         return None

@@ -35,6 +35,7 @@ def complements(network: Network) -> Network:
         return ex.substitute(root, {n: _element_of(found[n.data[0]], n.args)[1] for n in read}) if read else root
 
     guards = {o.name: o.expression for o in network.observations}
+    # switches whose flow constraint becomes a condition on the effort
     dual = [s for s in network.switches if s.label in found]
     watched = dict(pair for s in dual for pair in _watched_efforts(s, found[s.label]))
     watched |= dict(_guard_efforts(dual, found, guards))
@@ -72,6 +73,7 @@ def _by_turns(network: Network, alone: Alone) -> Network:
 
 
 def _single_flow_constraints(network: Network) -> Alone:
+    """Constraints c*f = 0 of the flow of a branch without law or store, by that flow, with c."""
     free = {b.name for b in network.branches if b.law is None and b.kind == "field"}
     said = ex.topological(expressions(network, "energies", "works"))
     stored = {n.data[0] for n in said if n.op == "var" and n.data[1] in ("bf", "bq", "be", "bp")}
@@ -134,11 +136,13 @@ def _guard_efforts(
 ) -> Iterator[tuple[str, Node]]:
     """When rows of efforts hold: while the flow is not held, and no inequality of it is there beside an equation."""
     branches: dict[Node, list[Switch]] = {}
+    # switches of one branch together
     for s in dual:
         if s.guard is not None:
             at = tuple(ex.const(float(k)) for k in s.at)
             (effort,) = (n for n in ex.variables(_element_of(found[s.label], at)[1]) if n.op == "var")
             branches.setdefault(effort, []).append(s)
+    # the effort is zero while the flow is free; an inequality takes its place while it holds
     for same in branches.values():
         held = next(s for s in same if s.kind == "guarded")
         open_ = ex.sub(ex.const(1.0), guards[held.guard or ""])

@@ -60,6 +60,7 @@ def _ties(
     if not ties:
         return
     told = set(asked)
+    # what anything but a plain branch reads or joins must stay
     for link in found:
         plain = isinstance(link.item, Branch) and link.item.on is None
         told |= link.reads if plain else link.reads | link.joined
@@ -70,6 +71,7 @@ def _ties(
     seen = set[Quantity]()
     for b in ties:
         part, ahead, joins = set[Quantity](), [q for q in _nodes(b) if q not in seen], 0
+        # the part that the branch's nodes belong to, and how many branches join it to the ground
         while ahead:
             q = ahead.pop()
             if q not in part:
@@ -77,6 +79,7 @@ def _ties(
                 joins += sum(None in _ends(other) for other in beside[q])
                 ahead += [q for other in beside[q] for q in _nodes(other)]
         seen |= part
+        # a single tie carries no flow: the reference alone
         if joins == 1 and not part & told:
             yield frozenset({("b", b.name)})
 

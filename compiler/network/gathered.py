@@ -161,6 +161,7 @@ class _Families:
     def _initials(self, initials: Sequence[Initial]) -> Iterator[Initial]:
         """Initial values of neighbours that are said alike as one statement in a loop, in the place of the first."""
         groups: dict[tuple[object, ...], list[tuple[int, Initial, Shaped]]] = {}
+        # statements that differ by the element and numbers alone
         for i in initials:
             target, store = i.target, self.at.get(i.store, (i.store, 0))[0]
             shape = shape_of(i.value, "") if target.op == "var" and target.data[0].endswith(MARK) else None
@@ -168,10 +169,12 @@ class _Families:
                 key = (target.data, i.fixed, store, i.unit, i.depth, i.said, shape.key)
                 groups.setdefault(key, []).append((int(target.args[0].data), i, shape))
         alike: dict[int, list[tuple[int, Initial, Shaped]]] = {}
+        # a run of neighbours, long enough
         for found in groups.values():
             places = [k for k, _, _ in found]
             if len(found) >= RUN and places == list(range(places[0], places[0] + len(found))):
                 alike |= {id(i): found if k == places[0] else [] for k, i, _ in found}
+        # the run in the place of its first statement
         for i in initials:
             if id(i) not in alike:
                 yield replace(i, store=self.at.get(i.store, (i.store, 0))[0])

@@ -56,6 +56,7 @@ def read_by(network: Network, roots: Iterable[Node]) -> frozenset[Quantity]:
 
 
 def _quantity(node: Node, unknowns: set[str]) -> Quantity:
+    """What a variable stands for in the graph of influences: its kind's letter and its owner's name."""
     name, kind, _ = node.data
     match kind:
         case "s":
@@ -90,6 +91,8 @@ def links(network: Network) -> tuple[Link, ...]:
 
 
 def _links(network: Network) -> Iterator[Link]:
+    """All statements of a network as links between quantities: joined both ways, or read one way."""
+    # summand by summand: a term that nobody needs may go alone
     for e in network.energies:
         for piece in summands(e.expression):
             yield replace(_acting(network, e, [piece], []), piece=piece)
@@ -172,11 +175,13 @@ def _whole(c: Constraint, shape: Shape) -> bool:
 def influences_on(found: Sequence[Link], asked: frozenset[Quantity]) -> frozenset[Quantity]:
     """All that influences what is asked: through what is joined both ways, through what is read one way."""
     of: dict[Quantity, list[int]] = {}
+    # which links join each quantity
     for k, link in enumerate(found):
         for q in link.joined:
             of.setdefault(q, []).append(k)
     kept, ahead = set(asked), list(asked)
     followed = bytearray(len(found))
+    # a joined quantity brings all that its links join and read
     while ahead:
         for k in of.get(ahead.pop(), ()):
             if not followed[k]:

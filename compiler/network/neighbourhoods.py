@@ -90,6 +90,7 @@ def _sites(network: Network, laws: Laws) -> dict[str, Site]:
     parts = Joined[str]()
     touched: dict[str, list[int]] = {}
     kinds: dict[tuple[object, ...], int] = {}
+    # ends of which branches touch each node
     for b in network.branches:
         names = [end.node for end in (b.plus, b.minus) if end is not None and end.node is not None]
         if len(names) == 2:
@@ -100,6 +101,7 @@ def _sites(network: Network, laws: Laws) -> dict[str, Site]:
                 touched.setdefault(end.node, []).append(kind + k)
     found: dict[str, Site] = {}
     size: dict[str, int] = {}
+    # nodes touched alike are one family, numbered in the order of the text
     for node in network.nodes:
         if node.shape or node.name in network.read or MARK in node.name or node.name not in touched:
             continue
@@ -123,10 +125,12 @@ def _whole(network: Network, laws: Laws, sites: dict[str, Site]) -> Found:
 def _fragmented_families(network: Network, sites: dict[str, Site], runs: Sequence[Run]) -> set[str]:
     """Families of which alike neighbours are fewer than SHORT on the average."""
     cuts: dict[str, set[int]] = {}
+    # where a run begins or ends a family is cut
     for run in runs:
         for (family, first), moves in zip(run.ends, run.moves, strict=True):
             cuts.setdefault(family, set()).update((first, first + (len(run.members) if moves else 1)))
     held = {b.name for run in runs for b, _ in run.members}
+    # so does a branch of no run
     for b in network.branches:
         for end in (b.plus, b.minus) if b.name not in held else ():
             if end is not None and end.node in sites:
@@ -144,6 +148,7 @@ def _runs(network: Network, laws: Laws, sites: dict[str, Site]) -> Iterator[Run]
         return ("", -1) if end.node is None else sites.get(end.node, (end.node, -1))
 
     groups: dict[tuple[object, ...], list[tuple[int, int, Branch, tuple[Site, Site]]]] = {}
+    # branches of one law between the same families, at one distance
     for b in network.branches:
         if b.name in laws.numbers:
             ends = site(b.plus), site(b.minus)
@@ -151,6 +156,7 @@ def _runs(network: Network, laws: Laws, sites: dict[str, Site]) -> Iterator[Run]
                 apart = ends[1][1] - ends[0][1] if min(ends[0][1], ends[1][1]) >= 0 else 0
                 key = laws.numbers[b.name], ends[0][0], ends[1][0], apart
                 groups.setdefault(key, []).append((ends[0][1], ends[1][1], b, ends))
+    # neighbours whose ends move on by one or stay
     for found in groups.values():
         found.sort(key=itemgetter(0, 1))
         first = 0

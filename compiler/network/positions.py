@@ -92,9 +92,11 @@ def with_positions(network: Network, wanted: frozenset[Wanted]) -> Network:
     """Positions as unknowns of the start, in parts where displacements are said or stores may stand in loops; wanted:
     displacements with quadratures.
     """
+    # contents of stores tell differences of positions
     springs = tuple(_springs(network, wanted))
     read = (n for n in ex.topological(expressions(network, "initials")) if n.op == "var")
     said = {n.data[0] for n in read if n.data[1] in ("nq", "bq", "be")}
+    # where anything else is said, all parts have positions
     open_ = _says_of_others(network) or _massless(network, springs)
     parts = _parts(network, springs, said | {name for name, _ in wanted}, open_=open_)
 

@@ -163,12 +163,14 @@ def _parts(
     """The connected parts of what goes, in the order of the text."""
     head = {q: q for q in gone}
 
+    # union-find over what goes
     def first(q: Quantity) -> Quantity:
         while head[q] != q:
             head[q] = head[head[q]]
             q = head[q]
         return q
 
+    # which of what stays each part reads
     for link in found:
         own = sorted((link.joined | link.reads) & gone)
         for q in own[1:]:
@@ -182,6 +184,7 @@ def _parts(
         members.setdefault(first(q), set()).add(q)
     named = [(_names_of(network, own), tuple(sorted(reads.get(q, ())))) for q, own in members.items()]
     order = {name: k for k, (_, name) in enumerate(quantities(network))}
+    # reads something: downstream; nothing: an island
     for names, read in sorted(named, key=lambda pair: min(order[name] for _, name in pair[0])):
         yield Removal("downstream" if read else "island", names, read)
 

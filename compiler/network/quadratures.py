@@ -36,6 +36,7 @@ def from_masses(network: Network) -> Network:
     """Momenta of points, and their rates, as those of the kinetic stores that move with them."""
     whole = massive(network)
     held: dict[str, list[tuple[float, Branch, tuple[Node, ...]]]] = {}
+    # kinetic stores at each node, with their sense
     for b in network.branches:
         for terminal, sign in ((b.plus, 1.0), (b.minus, -1.0)):
             if b.kind == "kinetic" and terminal is not None and terminal.node is not None:
@@ -44,6 +45,7 @@ def from_masses(network: Network) -> Network:
     def stores(node: Node) -> Node:
         """A store stands at all points of a family, or at one of them."""
         terms = []
+        # a store at this point, or one of a family at all of them
         for sign, b, at in held.get(node.data[0], ()):
             if not b.loops and at == node.args:
                 terms.append((sign, ex.var(b.name, "bp", *b.at, order=node.data[2])))
@@ -86,20 +88,24 @@ def _add_quadratures(network: Network, wanted: Iterable[Wanted], rate: str) -> N
     """With a dynamic variable for each of these, of this rate (e or f), read in their places."""
     wanted = dict.fromkeys(wanted)
 
+    # the variable where it is read, and its rate
     def read(root: Node) -> Node:
         found = [n for n in ex.topological([root]) if n.op == "var" and n.data[:2] in wanted]
         change = {n: _quadrature(n.data[0], n.data[1][1], n.args, n.data[2]) for n in found}
         return ex.substitute(root, change) if found else root
 
     families: dict[Wanted, list[tuple[tuple[Loop, ...], tuple[Node, ...], Domain, Place]]] = {}
+    # loops and indices of all families that have displacements
     for n in network.nodes:
         families[n.name, "nq"] = [(*whole(n), n.domain, n.place)]
     for b in network.branches:
         for kind in ("bq", "bp"):
             families.setdefault((b.name, kind), []).append((b.loops, b.at, b.domain, b.place))
+    # quadratures that a law reads take part in the motion; others are measured alone
     laws = (n for law in expressions(network, "branches.law") for n in ex.variables(law) if n.op == "var")
     lawful = {n.data[:2] for n in laws}
     states, dynamics = [], []
+    # a state of the variable's range with its rate
     for name, kind in wanted:
         measured = (name, kind) not in lawful
         for loops, at, domain, place in families[name, kind]:
@@ -107,6 +113,7 @@ def _add_quadratures(network: Network, wanted: Iterable[Wanted], rate: str) -> N
             states.append(State(f"{name}.{kind[1]}", shape, unit, place, measured=measured))
             own = _quadrature(name, kind[1], at)
             dynamics.append(Dynamic(own, ex.var(name, f"{kind[0]}{rate}", *at), loops, place))
+    # what is said of their start is said of the states
     told = {(*w, 0) for w in wanted if w[1] != "nq"}
     starts = [i for i in network.initials if i.target.op == "var" and i.target.data in told]
     begun = (replace(i, target=read(i.target)) for i in starts)

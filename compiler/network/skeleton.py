@@ -40,14 +40,18 @@ def shape_of(root: Node | None, own: str) -> Shaped | None:
 
 
 def _key(node: Node, own: str, holes: list[Node], left: list[int], *, whole: bool = False) -> tuple[object, ...]:
+    """Text of a node without its numbers, which become holes; raises where it reads more than time and `own`."""
     left[0] -= 1
+    # long expressions are rarely alike
     if left[0] < 0:
         raise _StrangeError
+    # a sum, and a single term as a sum of one: numbers are holes
     if node.op == "sum" or (whole and node.op not in ("const", "param")):  # 1 ohm*f is f
         (constant, coefficients), args = (node.data, node.args) if node.op == "sum" else ((0.0, (1.0,)), (node,))
         holes += [const(constant), *map(const, coefficients)]
         return "sum", *(_key(a, own, holes, left) for a in args)
     match node.op:
+        # numbers and parameters are holes
         case "const":
             holes.append(node)
             return ("hole",)
@@ -56,6 +60,7 @@ def _key(node: Node, own: str, holes: list[Node], left: list[int], *, whole: boo
             return ("hole",)
         case "time":
             return ("time",)
+        # quantities of the element itself
         case "var" if node.data[0] == own and not node.args:
             return "own", *node.data[1:]
         case "mul" | "pow":
@@ -72,6 +77,7 @@ def fill_shape(shape: Shaped, own: str, at: tuple[Node, ...], holes: Sequence[No
 
 
 def _fill(key: tuple[object, ...], own: str, at: tuple[Node, ...], rest: list[Node]) -> Node:
+    """The node of a key, its holes taken from `rest` in order."""
     what, *inner = key
     match what:
         case "hole":

@@ -40,6 +40,7 @@ def as_elements(network: Network, functions: frozenset[str]) -> Network:
         functions = functions - {"T"}
     nodes = {n.name: n.domain for n in network.nodes}
     kept, made = [], []
+    # summand by summand, or else the whole: an element each, or the statement stays
     for number, energy in enumerate(network.energies):
         for pieces in (summands(energy.expression), [energy.expression]) if energy.function in functions else ():
             names = [f"{energy.function} {number}.{k}" for k in range(len(pieces))]

@@ -30,7 +30,7 @@ class Strand:
     nodes: tuple[str | None, ...]
 
     def reverse(self) -> Strand:
-        """The same the other way round."""
+        """The strand the other way round."""
         return Strand(tuple((b, not sense) for b, sense in reversed(self.branches)), self.nodes[::-1])
 
 
@@ -56,6 +56,7 @@ class _Graph:
         self.loose: dict[str, Branch] = {}
         self.at: dict[str, list[Branch]] = {}
         self.parts = Joined[str]()
+        # loose branches: of a law with a number, at a node that nothing else reads
         for b in network.branches:
             ends = [end for end in (b.plus, b.minus) if end is not None]
             names = [end.node for end in ends if end.node is not None]
@@ -138,6 +139,7 @@ def strands(network: Network, laws: Laws, taken: Collection[str]) -> Strands:
         for way in ways
     ]
     of = _buses(network, graph, ways)
+    # buses that too few strands end at are dropped until nothing changes
     while True:
         size = Counter(of.values())
         of = {name: key for name, key in of.items() if size[key] >= RUN}
@@ -148,6 +150,7 @@ def strands(network: Network, laws: Laws, taken: Collection[str]) -> Strands:
         if not lost:
             break
         of = {name: key for name, key in of.items() if key not in lost}
+    # what is left, by class
     buses: dict[str, list[str]] = {}
     for name, key in of.items():
         buses.setdefault(key, []).append(name or "")

@@ -183,6 +183,7 @@ class _Writer:
         lines: list[str] = []
         for s in statements:
             match s:
+                # an angle of which both sine and cosine are read is turned once
                 case Assign() if s.target in self.angles:
                     lines += [f"{indent}{line}" for line in self.sine_or_cosine(s)]
                 case Assign():
@@ -269,9 +270,11 @@ class _Writer:
         """The right-hand side of an assignment."""
         args = [_operand(a) for a in s.args]
         match s.op:
+            # unknowns and their rates by place
             case "y" | "yd":
                 self.used.add(s.op)
                 return f"{s.op}[{self.place(s.data, 'at')}]"
+            # a scalar parameter; arrays by element
             case "p":
                 self.used.add("p")
                 return f"p[{s.data}]"
@@ -283,6 +286,7 @@ class _Writer:
                 return "t"
             case "index":
                 return f"(double){_loop(s.data)}"
+            # without factors of one and signs of minus
             case "sum":
                 return total(s.data, args, C)
             case "mul":

@@ -51,6 +51,7 @@ class Rolled:
         """Take outputs that are alike of kernels without loops; kept: routines that stay as they are."""
         for _, found in groupby(enumerate(program.routines), _kernel):
             kernel = dict(found)
+            # short kernels gain nothing
             if sum(len(r.body) for r in kernel.values()) < LARGE:
                 continue
             sums = repeated_places(kernel.values())
@@ -60,6 +61,7 @@ class Rolled:
                 if outputs is None:
                     continue
                 printed = printer(routine)
+                # several terms into one place: the order of the sum is kept
                 if any(isinstance(s, Store) and s.place in sums for s in routine.body):
                     self._in_order(k, routine, outputs, printed)
                 else:
@@ -77,6 +79,7 @@ class Rolled:
                 self._write_shared(program, out, group(key, [numbers for _, numbers in found]), [k for k, _ in found])
 
     def _write_shared(self, program: Program, out: str, alike: Group, numbers: list[int]) -> None:
+        """Write one function for loops that are alike but for numbers, and a call with its tables for each of them."""
         name = f"g{len(self.texts)}"
         head, tables = self._table_names(alike)
         kind = "void " if out == "r" else "double *"
@@ -130,6 +133,7 @@ class Rolled:
         self.calls[k] = (self._function(routine, "long sums", body, tables),)
 
     def _terms(self, found: Sum, printed: Printed) -> Iterator[tuple[str, list[str]]]:
+        """Terms of a long sum as text: alike neighbours as turns of a loop, others one by one."""
         split = []
         for c, statements in found.terms:
             factor = "" if abs(c) == 1.0 else f"{abs(c)!r}*"

@@ -236,6 +236,7 @@ class _Writer:
         """The right-hand side of an assignment."""
         args = [_operand(a) for a in s.args]
         match s.op:
+            # as in C, over all iterations at once
             case "y" | "yd":
                 return f"{s.op}[{self.where(s.data, f'at[{s.data.family}]')[0]}]"
             case "p":

@@ -24,7 +24,7 @@ _READ = frozenset(("y", "yd", "p", "element", "time", "index"))
 
 
 def share_operations(routine: Routine) -> Routine:
-    """The same values but for round-off, in fewer operations."""
+    """A routine of the same values but for round-off, in fewer operations."""
     return replace(routine, body=_drop_unused(_share_factors(_Scaled(routine.body).body)))
 
 
@@ -46,17 +46,20 @@ class _Scaled:
             self._take(s)
 
     def _take(self, s: Statement) -> None:
+        """Take over a statement: sums and products scaled, others with whole values."""
         match s:
             case Assign(op="sum"):
                 self._sum(s)
             case Assign(op="mul"):
                 self._product(s)
+            # reads have no arguments
             case Assign() if s.op in _READ:
                 self.body.append(s)
             case Assign():
                 self.body.append(replace(s, args=tuple(map(self._whole, s.args))))
             case Store():
                 self.body.append(replace(s, value=self._whole(s.value)))
+            # a fold reads values under their own numbers
             case Fold():
                 for target in _read(s):
                     self._keep(target)
@@ -91,6 +94,7 @@ class _Scaled:
             self._scale[target] = scale, own
 
     def _sum(self, s: Assign) -> None:
+        """A sum by its first coefficient: a + b and -2 a - 2 b share one operation."""
         constant, given = s.data
         parts = [self._scale_of(a) for a in s.args]
         coefficients = [c * scale for c, (scale, _) in zip(given, parts, strict=True)]
@@ -98,6 +102,7 @@ class _Scaled:
         first = coefficients[0]
         alike = not constant and _binary(first) and len({abs(c) for c in coefficients}) == 1
         scale = first if alike else math.copysign(1.0, first)
+        # 2 x is x, scaled
         if len(args) == 1 and alike and isinstance(args[0], int):
             self._is(s.target, first, args[0])
             return
@@ -105,10 +110,12 @@ class _Scaled:
         self._is(s.target, scale, self._make("sum", data, args, s.target))
 
     def _product(self, s: Assign) -> None:
+        """A product without the powers of two in its factors."""
         scale, args = 1.0, []
         for exponent, value in zip(s.data, s.args, strict=True):
             factor, own = self._scale_of(value)
             power = factor**exponent if exponent == int(exponent) else 0.0
+            # powers of two are exact: they move into the scale
             if _binary(power) and _binary(scale * power):
                 scale *= power
                 args.append(own)
@@ -156,6 +163,7 @@ def _pairs(factors: dict[int, list[int]], number: int) -> dict[int, tuple[int, i
     heap = [(-sum(at.values()), pair) for pair, at in where.items()]
     heapq.heapify(heap)
     new: dict[int, tuple[int, int]] = {}
+    # a heap with stale counts: an entry that is not up to date goes back
     while heap:
         count, pair = heapq.heappop(heap)
         now = sum(where[pair].values())
@@ -165,6 +173,7 @@ def _pairs(factors: dict[int, list[int]], number: int) -> dict[int, tuple[int, i
             heapq.heappush(heap, (-now, pair))
             continue
         touched: set[tuple[int, int]] = set()
+        # each product that holds the pair gets the new number in its place
         for target, times in list(where[pair].items()):
             own = factors[target]
             touched |= _note(where, target, own, remove=True)

@@ -65,16 +65,20 @@ class Elaborator(Instances):
     def _declare_statement(self, statement: syntax.Statement) -> None:
         """Statements that stand in components alone are refused in a model; the others declared."""
         match statement:
+            # `input u: N` of a model: what drives it from outside
             case syntax.Input():
                 self.model_input(statement)
+            # of components alone: whatever is outside connects to them, and outside of a model there is nothing
             case syntax.Port() | syntax.Branch():
                 what = "port" if isinstance(statement, syntax.Port) else "branch"
                 message = f"a model has no {what}: nothing could be connected to it"
                 raise self.resolver.fail("E408", message, statement.span, help="node, or a component")
+            # `e = R*f` needs the branch of a component whose law it is
             case syntax.Law():
                 raise self.resolver.fail("E303", "a law stands in a component with a branch", statement.span)
             case syntax.Level():
                 raise self.resolver.fail("E803", "levels belong to components", statement.span)
+            # param, coord, node, let, ...: in models as in components
             case _:
                 self.declare(statement)
 

@@ -102,31 +102,40 @@ class FileScope:
 
     def _declare(self, file: syntax.File, scope: Scope) -> None:
         """Units first, then every other name of a file."""
+        # statements that could not be read: the names in them are declared, if wrongly, so that their uses are no
+        # errors of their own
         for item in file.items:
             if isinstance(item, syntax.Broken):
                 scope.broken |= item.names
                 if "std" in item.names:  # an import that could not be read: what hangs on it is not reported again
                     scope.broken |= {name for name, module in library_components().items() if module in item.names}
+        # `unit kN = 1000 N`: coefficients and parameters of the file may be written in it
         units = [item for item in file.items if isinstance(item, (syntax.UnitAlias, syntax.UnitBase))]
         for unit in self._dependency_order(
             units, scope, file.source
         ):  # units first: everything else is written in them
             self._unit(unit, scope, file.source)
+        # domains, components, constants, functions, tables and imports, in the order of the text
         for item in file.items:
             for symbol in self._symbols(item, scope, file.source):
                 self._enter(symbol, scope)
         Bundles(file, scope, self.report).declare(self._enter)
 
     def _enter(self, symbol: Symbol, scope: Scope) -> None:
+        """Enter a symbol in a file's scope; E106 where another one has its name, N102 where it hides one of the
+        language.
+        """
         before = scope.symbols.get(symbol.name)
         if before is symbol:  # imported twice
             return
+        # two declarations of one name, or one beside an import
         if before is not None:
             place, first = (self._imported.get(id(s), s.place) for s in (symbol, before))
             related = (Related("first declared here", first),)
             self.report.error("E106", f"'{symbol.name}' is declared twice", place, related=related)
             return
         scope.symbols[symbol.name] = symbol
+        # a name of the prelude may be declared anew, which N102 notes
         if scope.outer is not None and (symbol.name in scope.outer.symbols or _hides_function(symbol)):
             self._hides(symbol.name, self._imported.get(id(symbol), symbol.place))
 
@@ -154,10 +163,13 @@ class FileScope:
         if name in scope.units:
             self.report.error("E106", f"unit '{name}' is declared twice", Place(source, item.name.span))
             return
+        # `unit N = ...` hides the SI's N in this file
         if find_unit(name) is not None:
             self._hides(name, Place(source, item.name.span))
+        # `unit EUR base`: a dimension that nothing else has
         if isinstance(item, syntax.UnitBase):
             scope.units[name] = Unit(((name, 1),), Fraction(1), name)
+        # `unit kp = 9.81 N`: a positive constant multiple of known units
         else:
             resolver = Resolver(self.report)
             try:
@@ -166,6 +178,7 @@ class FileScope:
             except Failed:
                 scope.broken.add(name)
                 return
+            # `unit u = 0 m`, `unit u = -1 m` or one that reads a parameter measures nothing
             if value.node.op != "const" or not 0.0 < value.node.data < float("inf"):
                 message = f"unit '{name}' is not a positive constant"
                 self.report.error("E201", message, Place(source, item.value.span))
@@ -176,10 +189,13 @@ class FileScope:
     def _symbols(self, item: syntax.TopLevel, scope: Scope, source: SourceText) -> Iterator[Symbol]:
         """The names that a top-level item declares."""
         match item:
+            # effort, flow and what a node has in common
             case syntax.Domain():
                 yield from self._domain(item, scope, source)
+            # a model may be used as a component of another one
             case syntax.Component() | syntax.Model():
                 yield ComponentSymbol(item.name.name, item.body, scope, source, Place(source, item.name.span))
+            # resolved where it is read first, in the scope of its own file
             case syntax.Const():
                 span = item.name.span
                 place = Place(source, span)
@@ -189,6 +205,7 @@ class FileScope:
                 yield FunctionSymbol(item, source, scope, Place(source, item.name.span))
             case syntax.Table():
                 yield from self._table(item, scope, source)
+            # the symbols of another file, entered as if they were declared here
             case syntax.Import():
                 yield from self._import(item, source)
 
@@ -196,18 +213,22 @@ class FileScope:
         """Names of another file or of the library; what is not there is reported once."""
         module = self._module(item, source)
         if module is None:
+            # each name is a unit, another symbol, or not there
             for word in item.names:  # reported; what hangs on them is not reported again
                 self.scope.broken.add(word.name)
             return
         for word in item.names:
             symbol = module.symbols.get(word.name)
             unit = module.units.get(word.name)
+            # `from units import kp`
             if unit is not None:
                 self.scope.units[word.name] = unit
+            # the place of the import is kept: two imports of one name are reported there
             elif symbol is not None:
                 self._imported[id(symbol)] = Place(source, word.span)
                 self._warn_of_extrapolation(symbol, word, source)
                 yield symbol
+            # `from std.electrical import mass`: the module that has it, or the nearest name of this one
             else:
                 other = library_components().get(word.name)
                 near = None if other else nearest(word.name, module.symbols)
@@ -232,6 +253,7 @@ class FileScope:
         inside = names[0] == "std"
         folder = LIBRARY if inside else Path(source.name).parent
         path = folder.joinpath(*names[inside:]).with_suffix(".sd")
+        # read before; None: it is being read now, so that the two import each other
         if path in self._modules:
             found = self._modules[path]
             if found is None:
@@ -239,6 +261,7 @@ class FileScope:
                 other = f"modules '{here}' and '{names[-1]}' import each other"
                 self.report.error("E801", f"module '{here}' imports itself" if here == names[-1] else other, place)
             return found
+        # `from std.electric import resistor`, or `from electrical import ...` without the `std.`
         if not path.is_file():
             modules = sorted(p.stem for p in folder.glob("*.sd") if p.stem != "prelude")
             near = nearest(names[-1], modules)
@@ -248,6 +271,7 @@ class FileScope:
             help_ = f"nearest module: '{head}{near}'" if near else f"there are {listed or 'none'}"
             self.report.error("E103", f"there is no module '{'.'.join(names)}'", place, help=help_)
             return None
+        # marks the module as being read until its names are there
         self._modules[path] = None
         file, problems = _of_library(path) if inside else parse(SourceText.read(path))
         self.report.extend(problems)
@@ -264,6 +288,7 @@ class FileScope:
         """A domain from its roles: units of effort, flow, momentum, displacement, and what is common at a node."""
         units: dict[str, Unit] = {}
         common, pseudo, before = "effort", None, len(self.report)
+        # roles with their units, what is common at a node, and whether effort times flow is no power
         for part in item.body:
             match part:
                 case syntax.DomainRole():
@@ -277,11 +302,13 @@ class FileScope:
         place = Place(source, item.name.span)
         missing = [k for k in ("effort", "flow", "displacement") if k not in units]
         unread = len(self.report) > before or any(isinstance(part, syntax.Broken) for part in item.body)
+        # effort, flow and displacement have no default; a role that was misread is reported already
         if missing and not unread:
             self.report.error("E210", f"domain {item.name.name}: its {missing[0]} is not given", place)
         if missing or unread:
             scope.broken.add(item.name.name)
             return
+        # without a momentum there are no kinetic stores (thermal); its unit is that of effort times time
         kinetic = "momentum" in units
         units.setdefault("momentum", si(multiply(units["effort"].dimension, dim.TIME)))
         self._check_domain(item.name.name, units, pseudo, place)

@@ -63,7 +63,7 @@ class Requirement:
 
 @dataclass(slots=True)
 class CastRequirement:
-    """The same of an instance that was cast, whose node is made where somebody reads it."""
+    """A requirement of an instance that was cast: its node is made where somebody reads it."""
 
     cast: Cast
     path: str

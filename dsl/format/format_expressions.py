@@ -49,15 +49,19 @@ def pieces(expr: s.Expr | s.Range) -> list[str]:
     after_unit = False
     while stack:
         part = stack.pop()
+        # a sign or a word: goes out as it is
         if isinstance(part, str):
+            # `300 K / T` divides by T; `300 K/T` would be a unit
             if after_unit and part == "/" and stack and _begins_like_a_name(stack[-1]):
                 part = " / "
+            # `(2 m) ^n` likewise
             elif after_unit and part == "^":
                 part = " ^"
             after_unit = False
             out.append(part)
             continue
         node, level = part
+        # a sum as a factor needs parentheses
         if _LEVELS.get(type(node), _ATOM) < level:
             stack.extend((")", (node, _CONDITIONAL), "("))
             continue

@@ -154,6 +154,7 @@ def _instance(n: s.Instance) -> Pieces:
 
 
 def _connection(n: s.Connection) -> Pieces:
+    """Text of a connection in pieces, as it is written behind the parentheses of an element."""
     match n:
         case s.Across(plus, minus):
             return [*pieces(plus), " -> ", *pieces(minus)]

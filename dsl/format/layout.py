@@ -19,6 +19,7 @@ def fill(pieces: Sequence[str], indent: int) -> list[str]:
     A break goes after the last comma, spaced operator or word that fits, and only where there is
     none after a `=`, `*`, `/` or an opening bracket.
     """
+    # most statements fit
     if sum(map(len, pieces)) + indent <= WIDTH:
         return [" " * indent + "".join(pieces).rstrip()]
     lines: list[str] = []
@@ -27,6 +28,7 @@ def fill(pieces: Sequence[str], indent: int) -> list[str]:
     good: int | None = None
     poor: int | None = None
     depth = 0
+    # greedy: at the last good place before the line is full, else at the last poor one
     while position < len(pieces):
         piece = pieces[position]
         width += len(piece)

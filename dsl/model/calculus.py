@@ -126,15 +126,18 @@ def _along(dot: Node, scaled: Callable[[Node], Node]) -> Node:
     """
     zero = const(0.0)
     branches, waiting = {dot}, [dot]
+    # all branches of nested conditions
     while waiting:
         node = waiting.pop()
         new = [a for a in node.args[1:] if a not in branches] if node.op == "cond" else []
         branches.update(new)
         waiting += new
+    # the usual case: no condition makes it zero
     if zero not in branches:
         return scaled(dot)
     done: dict[Node, Node] = {zero: zero}
     waiting = [dot]
+    # inside out, each condition once: zero where it was, scaled elsewhere
     while waiting:
         node = waiting[-1]
         inner = node.args[1:] if node.op == "cond" else ()
@@ -162,11 +165,13 @@ def _chain(node: Node, dots: Sequence[Node]) -> Node:
     """The differential of a node from those of its arguments (some are zero)."""
     zero = const(0.0)
     match node.op:
+        # d(c u + k v) = c du + k dv
         case "sum":
             moving = [(w, d) for w, d in zip(node.data[1], dots, strict=True) if d is not zero]
             if len(moving) == 1:
                 return _along(moving[0][1], lambda d: linear(0.0, ((moving[0][0], d),)))
             return _sum_differentials(moving)
+        # the product rule, a term for each factor that moves
         case "mul":
             parts: list[tuple[float, Node]] = []
             for k, dot in enumerate(dots):
@@ -175,6 +180,7 @@ def _chain(node: Node, dots: Sequence[Node]) -> Node:
                     lower = partial(_power_differential, others, node.data[k], node.args[k])
                     parts.append((node.data[k], _along(dot, lower)))
             return _sum_differentials(parts)
+        # d(b^e) = e b^(e-1) db + b^e ln(b) de
         case "pow":
             base, exponent = node.args
             slope = mul(exponent, power(base, linear(-1.0, ((1.0, exponent),))))
@@ -182,13 +188,17 @@ def _chain(node: Node, dots: Sequence[Node]) -> Node:
                 _along(dots[0], lambda d: mul(slope, d)) if dots[0] is not zero else zero,
                 mul(node, call("ln", base), dots[1]) if dots[1] is not zero else zero,
             )
+        # of the argument that is taken
         case "call" if node.data in ("min", "max"):
             return conditional(compare("<=" if node.data == "min" else ">=", *node.args), *dots)
+        # the chain rule, with the partial derivatives of the function
         case "call":
             moving = [(p, d) for p, d in zip(_call_partials(node), dots, strict=True) if d is not zero]
             return add(*(_along(d, _times([(1.0, p)])) for p, d in moving))
+        # the condition itself has no slope
         case "cond":
             return conditional(node.args[0], dots[1], dots[2])
+        # a table's derivative is a table of higher order, in one argument or several
         case "table":
             if len(node.args) > 1:
                 orders = node.data[1] or (0,) * len(node.args)
@@ -200,6 +210,7 @@ def _chain(node: Node, dots: Sequence[Node]) -> Node:
                     )
                 )
             return mul(table(node.data[0], *node.args, order=node.data[1] + 1), dots[0])
+        # a sum of derivatives; of products and extrema it is not written down
         case "reduce":
             operator, name = node.data
             if operator == "sum":

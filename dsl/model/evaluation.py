@@ -57,6 +57,7 @@ _COMPARE: Mapping[str, Callable[[float, float], bool]] = {
 
 
 def _value(node: Node, values: Mapping[Node, Any], lookup: Callable[[Node], float]) -> Any:
+    """Value of a node from those of its arguments; leaves by `lookup`. Sums are rounded once (fsum)."""
     args = [values[a] for a in node.args if a in values]
     match node.op:
         case "const":
@@ -82,14 +83,17 @@ def _value(node: Node, values: Mapping[Node, Any], lookup: Callable[[Node], floa
             return any(args)
         case "not":
             return not args[0]
+        # bounds that are no numbers make no sum
         case "reduce":
             finite = math.isfinite(args[0]) and math.isfinite(args[1])
             return _reduce(node, round(args[0]), round(args[1]), lookup) if finite else math.nan
+        # a variable, parameter, time, index or table
         case _:
             return lookup(node)
 
 
 def _reduce(node: Node, first: int, last: int, lookup: Callable[[Node], float]) -> float:
+    """A sum, product or extremum over a range first..last, of a body that is evaluated for each index."""
     operator, name = node.data
     me = index(name)
 
@@ -103,6 +107,7 @@ def _reduce(node: Node, first: int, last: int, lookup: Callable[[Node], float]) 
             return math.fsum(items)
         case "prod":
             return math.prod(items)
+        # of nothing: no bound at all
         case "min":
             return min(items, default=math.inf)
         case _:

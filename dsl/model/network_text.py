@@ -15,6 +15,7 @@ def show(network: Network) -> str:
 
 
 def _lines(n: Network) -> Iterator[str]:
+    """A line for each statement of the network, in the order in which it holds them."""
     scene = f" under scene {n.scene.name}" if n.scene else ""
     yield f"model {n.model}{scene}"
     for p in n.parameters:

@@ -50,6 +50,7 @@ def reals(root: Node, known: Mapping[Node, Reals]) -> Reals:
 
 
 def _reals_of(node: Node, args: list[Reals]) -> Reals:
+    """Where the value of a node lies, from where those of its arguments do; ALL where nothing is known."""
     match node.op:
         case "const":
             return Reals(node.data, node.data, node.data != 0.0)
@@ -61,10 +62,12 @@ def _reals_of(node: Node, args: list[Reals]) -> Reals:
             for e, a in zip(node.data, args, strict=True):
                 total = _times(total, _power(a, e))
             return total
+        # an odd function has the sign of its argument
         case "call" if node.data in _ODD:
             return {1: POSITIVE, -1: NEGATIVE}.get(args[0].sign, ALL)
         case "call":
             return _CALLS.get(node.data, ALL)
+        # either branch
         case "cond":
             one, other = args[1:]
             return Reals(min(one.low, other.low), max(one.high, other.high), one.strict and other.strict)

@@ -90,6 +90,7 @@ def _factors(text: str) -> list[str] | None:
         return ["1"]
     found: list[str] = []
     end = 0
+    # name and exponent, without gaps
     for match in _FACTOR.finditer(text):
         if match.start() != end:
             return None
@@ -98,6 +99,7 @@ def _factors(text: str) -> list[str] | None:
         parts = [name] if find_unit(name) else _as_unit_list(name) or _split_units(name)
         if parts is None:
             return None
+        # `kgm2`: the exponent belongs to the last of those that grew together
         if exponent is not None:
             if re.search(r"[/^]", parts[-1]):
                 return None
@@ -118,11 +120,13 @@ def _word(name: str) -> str | None:
         return _WORDS[lower]
     if lower == "ohm":
         return "ohm"
+    # `milliamps`: a prefix in words, and a word
     for long, short in _LONG_PREFIXES.items():
         if lower.startswith(long):
             rest = _word(lower[len(long) :])
             if rest is not None and find_unit(short + rest):
                 return short + rest
+    # `kOhm`, `mVolt`: a prefix of one letter, and a word
     tail = lower[1:]
     base = "ohm" if tail == "ohm" else _WORDS.get(tail)
     return name[0] + base if base and find_unit(name[0] + base) else None
@@ -157,15 +161,19 @@ def case_variants(name: str) -> list[str]:
 
 def _split_units(name: str) -> list[str] | None:
     """A name that has grown together of two or three units, the longest first: `Nm`, `Nms`, `kgm`, `Ah`, `Pas`."""
+    # the longest head that is a unit which occurs in such words
     for end in range(len(name) - 1, 0, -1):
         head, tail = name[:end], name[end:]
         base = head if head in _STRONG else head[1:]
         if find_unit(head) is None or base not in _STRONG:
             continue
+        # `Nms` is N m s, not N times milliseconds
         if tail == "ms":
             return [head, "m", "s"]
+        # `Nm`
         if find_unit(tail):
             return [head, tail]
+        # three of them: `kgms`
         rest = _split_units(tail)
         if rest is not None:
             return [head, *rest]
@@ -258,6 +266,7 @@ def _expand_parentheses(line: str, at: int) -> tuple[int, str] | None:
     signs, sign, begun, end, starts = [1], 1, [0], at, True  # of each open parenthesis: its sign, its first factor
     while (token := _TOKEN.match(line, at)) is not None:
         name, mark, exponent = token.groups()
+        # a unit, above or below by all the parentheses around it
         if name:
             if find_unit(name) is None and name != "1":
                 if len(signs) > 1:
@@ -265,21 +274,26 @@ def _expand_parentheses(line: str, at: int) -> tuple[int, str] | None:
                 break
             factors.append((name, signs[-1] * sign))
             sign = 1
+        # what stands inside inherits the sign before it
         elif mark == "(":
             signs.append(signs[-1] * sign)
             begun.append(len(factors))
             sign = 1
+        # the group that ends here may get an exponent
         elif mark == ")":
             if len(signs) == 1 or starts:
                 break
             signs.pop()
             last = begun.pop()
+        # '.', '*' or '/': of the next factor
         elif mark:
             if starts:
                 return None
             sign = -1 if mark == "/" else 1
+        # an exponent without a base
         elif starts:
             return None
+        # an exponent: of one factor, or of the group before it
         else:
             whole = len(factors) - 1 if line[at - 1 : at] != ")" else last
             factors[whole:] = [(n, p * int(exponent)) for n, p in factors[whole:]]
@@ -288,6 +302,7 @@ def _expand_parentheses(line: str, at: int) -> tuple[int, str] | None:
         end = at if len(signs) == 1 and not starts else end
     if len(signs) > 1 or not factors:
         return None
+    # first what stands above, then what is divided by
     real = [(n, p) for n, p in factors if n != "1"]
     above = ".".join(n if p == 1 else f"{n}^{p}" for n, p in real if p > 0)
     below = [(n, -p) for n, p in real if p < 0]

@@ -333,7 +333,7 @@ class Context:
         return self.fitting(self.scalar(expression), expression, dimension, code, message)
 
     def fitting(self, value: Typed, expression: syntax.Expr, dimension: Dimension, code: str, message: str) -> Node:
-        """The same of a value found before."""
+        """The node of a value found before, of one dimension; else code with message (its {} is what was found)."""
         if value.dimension is not None and value.dimension != dimension:
             help_ = self.missing(value.dimension, dimension, expression)
             said = message if value.dimension else message.replace("in {}", "{}")
@@ -356,11 +356,13 @@ class Context:
     def whole_number(self, expression: syntax.Expr, what: str) -> Node:
         """An index or a bound: made of whole numbers, loop variables and dimensionless parameters."""
         value = self.scalar(expression)
+        # x[2 m]
         if value.dimension not in (None, NONE):
             message = f"{what} is in {dim.show(value.dimension)}, not a number"
             text = " ".join(self.source.text[expression.span.start : expression.span.end].split())
             help_ = f"a number without unit: param {text} = 3" if text.isidentifier() else "a number without unit"
             raise self.fail("E805", message, expression.span, help=help_, subject=f"unit of {text}")
+        # what varies in a run is no index; parameters that are used as one must be whole
         for node in ex.topological([value.node]):
             if node.op in ("var", "time", "table") or (node.op == "param" and node.data in self.discretes):
                 raise self.fail(
@@ -377,6 +379,7 @@ class Context:
                 self.whole.add(node.data)
             if node.op == "const" and node.data != node.data:
                 raise Failed
+        # x[1.5]
         if value.node.op == "const" and not float(value.node.data).is_integer():
             raise self.fail("E805", f"{what} is {value.node.data:g}, no whole number", expression.span)
         return value.node

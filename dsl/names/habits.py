@@ -98,12 +98,15 @@ class Remedy:
 
 def name(word: str, text: str, offset: int, moves: Callable[[str], bool]) -> Remedy | None:
     """What to write for an unknown name at an offset of a text; moves: whether a name has a rate."""
+    # `xdot`, where x has a rate
     for ending in _ENDINGS:
         base = word.removesuffix(ending)
         if base != word and moves(base):
             return Remedy(f"{base}'", f"{base}'")
+    # `dx`
     if len(word) > 1 and word[0] == "d" and moves(word[1:]):
         return Remedy(f"{word[1:]}'")
+    # the rest of a unit that was written with spaces or parentheses
     if find_unit(word) is not None:
         quantity = find_parenthesized(text, offset)
         if quantity is not None:
@@ -113,6 +116,7 @@ def name(word: str, text: str, offset: int, moves: Callable[[str], bool]) -> Rem
         if quantity is not None:
             said = f"{quantity.right}: a unit is written without spaces, its factors are joined by dots"
             return Remedy(said, quantity.right, (quantity.start, quantity.end))
+    # superscripts and fraction signs from other texts
     power = re.match(r"^(.*?)([\u00b2\u00b3\u00b9\u2070-\u2079]+)$", word)
     fraction = unicodedata.normalize("NFKC", word).replace("\u2044", "/")
     if power is not None and power[1]:

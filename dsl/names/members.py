@@ -51,10 +51,12 @@ class Members(Ports):
     def _item(self, e: syntax.Item) -> Value:
         """`x[i]`: an element of a parameter, an unknown, a definition or a vector."""
         found = self.locate(e)
+        # a path to something that was declared
         if found is not None:
             symbol = found.symbol
             if isinstance(symbol, (ParameterSymbol, UnknownSymbol)):
                 return self._substitute(self.own_element(symbol, found.indices, e.span), found.change)
+            # a formula with loop variables, at these indices
             if isinstance(symbol, Definition) and symbol.at and not symbol.implied:
                 if len(found.indices) != len(symbol.at):
                     raise self.index_count(symbol.name, len(symbol.at), len(found.indices), e.span)
@@ -62,6 +64,7 @@ class Members(Ports):
                 return self.outside(lambda: self.definition(symbol, at), found.change, e.span)
             if not isinstance(symbol, Definition):
                 return self.value(symbol, e.span)
+        # `[a, b, c][2]`, or a list by its name
         value = self.resolve(e.base)
         if not isinstance(value, Vector):
             raise self.fail("E805", "only an array has elements", e.span)
@@ -129,6 +132,7 @@ class Members(Ports):
                 return self._coordinate(symbol, base, e)
             case ConstraintSymbol():
                 return self._constraint_member(symbol, base, e)
+            # its own quantities; what an instance takes in where it is one of its ports
             case NodeSymbol():
                 at = (
                     *symbol.family.prefix,
@@ -138,12 +142,14 @@ class Members(Ports):
                 if e.name == ("e" if end.domain.common == "flow" else "f") and self.of_ports(e.base):
                     return self.taken_in(end, e)
                 return self._substitute(self.node_quantity(end, e), base.change)
+            # inside a component: the node outside
             case PortSymbol():
                 if base.indices:
                     raise self.index_count(symbol.name, 0, len(base.indices), e.span)
                 if e.name == ("e" if symbol.end.domain.common == "flow" else "f"):
                     return self.taken_in(symbol.end, e)
                 return self._substitute(self.node_quantity(symbol.end, e), base.change)
+            # R1.e, R1.f, R1.power
             case BranchSymbol():
                 at = self.indices(symbol.name, symbol.family.shape, base.indices, e.span)
                 return self._substitute(self.branch_quantity(symbol, at, e.name, e), base.change)
@@ -153,6 +159,7 @@ class Members(Ports):
                 return self._instance(symbol, base, e)
             case Unsupported():
                 raise Failed
+        # parameters, definitions and components have no members
         kind = "parameter" if isinstance(symbol, ParameterSymbol) else "value"
         help_ = self._elements_nearby(e)
         if isinstance(symbol, ComponentSymbol) and (near := nearest(e.name, self.scope.names())):
@@ -176,6 +183,7 @@ class Members(Ports):
         return self._substitute(self.coordinate_quantity(symbol, at, e), base.change)
 
     def _two_port(self, symbol: TwoPortSymbol, base: Located, e: syntax.Member) -> Value:
+        """Member of a transformer or gyrator: e1, f2, ... of a side, or what both sides absorb."""
         members = {f"{letter}{k}": (letter, k) for k in (1, 2) for letter in "efqp"}
         if e.name in ("power", "energy"):  # what both sides absorb: zero, but for what a run leaves of it
             both = []
@@ -195,11 +203,13 @@ class Members(Ports):
         """A member of an instance: a quantity of its branch, or what its component declares."""
         space, change = self.space_of(symbol, base, e.base.span)
         branch = space.scope.symbols.get("")
+        # a quantity of the component's own branch
         if isinstance(branch, BranchSymbol) and e.name in BRANCH:
             return self._substitute(self.branch_quantity(branch, (), e.name, e), change)
         if space.scope.is_broken(e.name):
             raise Failed
         level = f" at level {space.level}" if space.level else ""
+        # another level has it: noted where scenes may be run at several levels
         if e.name in space.elsewhere and self.lenient:
             message = f"'{self._excerpt(e.base)}' has no '{e.name}'{level}: left out"
             self.report.note("N905", message, self.place(e.span))
@@ -207,8 +217,10 @@ class Members(Ports):
         if e.name in space.elsewhere:
             message = f"'{self._excerpt(e.base)}' has no member '{e.name}'{level}"
             raise self.fail("E102", message, e.span, help=f"level {space.elsewhere[e.name]} has it")
+        # `R1.v`: the error of the branch names e
         if isinstance(branch, BranchSymbol) and habits.variable(branch.domain.name, e.name) is not None:
             return self._substitute(self.branch_quantity(branch, (), e.name, e), change)  # which says what is meant
+        # a near name, or a list of what is there
         names = [n for n in space.scope.symbols if n]
         near = nearest(e.name, (*names, *BRANCH) if branch is not None else names)
         listed = (*branch_words(branch.domain), *names) if isinstance(branch, BranchSymbol) else names
@@ -218,6 +230,7 @@ class Members(Ports):
             shown = self._excerpt(e.base)
             through = " + ".join(f"energy_through({shown}.{port})" for port in ports[:4])
             help_ = f"what goes in by its ports: {through}; or of an element inside, {shown}.LABEL.energy"
+        # an energy or power of what has several ends: of elements inside
         if branch is None and e.name in MEMBERS:
             help_ = self._holders(space, self._excerpt(e.base), e.name)
         if branch is None and ports and e.name in ("e", "f", "q", "p"):  # several ends have one each
@@ -269,6 +282,7 @@ class Members(Ports):
             raise NotYetError(symbol.name, span)
         if len(found[0].at) != len(at):
             raise self.index_count(symbol.name, len(found[0].at), len(at), span)
+        # the statement whose indices fit: rod[i], or rod[1] by itself
         for constraint in found:
             change: dict[Node, Node] = {}
             fits = True
@@ -289,10 +303,12 @@ class Members(Ports):
             raise Failed  # its statement was told
         symbol = None if base is None else base.symbol
         wrong = not isinstance(symbol, ConstraintSymbol) or symbol.kind == "gamma"
+        # a gamma has no multiplier
         if isinstance(symbol, ConstraintSymbol) and symbol.kind == "gamma" and e.name == "on":
             message = f"gamma '{symbol.name}' acts along nothing: it closes an implicit unknown, and has no multiplier"
             help_ = f"phi {symbol.name}: ... where it ties displacements, psi where it ties flows"
             raise self.fail("E102", message, e.span, help=help_)
+        # anything but label.on(expr)
         if base is None or wrong or e.name != "on" or len(e.args) != 1:
             help_ = "label.on(expr) of a phi or psi"
             if e.name == "energy_through" and len(e.args) == 1:
@@ -306,6 +322,7 @@ class Members(Ports):
         if target.dimension is None or not any(n.op == "var" for n in ex.variables(target.node)):
             help_ = "a coordinate, or an expression of some, that it acts along"
             raise self.fail("E203", "a constant has no displacement", e.args[0].span, help=help_)
+        # multiplier times the gradient along the target
         node = reaction(residual, symbol.kind == "phi", target.node, self.multiplier(symbol, at))
         return Typed(node, dim.quotient(dim.ENERGY, target.dimension))
 

@@ -132,6 +132,7 @@ class Names(Context):
                 return Typed(ex.const(math.pi), NONE)
             case "inf":
                 return Typed(ex.const(math.inf), None)
+            # names that have members only
             case "ground" | "audit":
                 members = "its nodes' potential is zero" if name == "ground" else "write audit.energy or another member"
                 raise self.fail("E104", f"'{name}' is not a value", span, help=members)
@@ -141,6 +142,7 @@ class Names(Context):
 
     def report_unknown(self, name: str, span: syntax.Span) -> Failed:
         """Report a name that stands for nothing (E101, E905; E908 among static quantities)."""
+        # its declaration is wrong and reported: no second finding
         if self.scope.is_broken(name):
             return Failed()
         if self.statics:
@@ -149,12 +151,14 @@ class Names(Context):
             text = "'ground' is not a value: it is the reference of every domain"
             return self.fail("E104", text, span, help="0: its effort, flow and displacement are zero")
         code, message = self._unknown
+        # a name of other languages: `xdot`, `PI`
         remedy = habits.name(name, self.source.text, span.start, self._moves)
         if remedy is not None:
             return self.fail_with_remedy(code, message.format(name), span, remedy)
         if name in dim.FUNCTIONS:
             said = {"celsius": "celsius(20)"}.get(name, f"{name}(...)")
             return self.fail(code, message.format(name), span, help=f"a function: {said}")
+        # a name that differs by little, or the line that would declare it
         near = nearest(name, (*self.scope.names(), *self._bound, "t", "pi", "inf"))
         near = None if code == "E905" and name in habits.RESULTS else near
         help_ = f"nearest name in scope: '{near}'" if near else f"declare it by param {name} = ..., let, coord or node"
@@ -174,8 +178,10 @@ class Names(Context):
     def value(self, symbol: Symbol, span: syntax.Span) -> Value:
         """What a symbol is worth by itself; E104 where it has members only."""
         match symbol:
+            # a number or an unknown; an array as a list where its size is a number
             case ParameterSymbol() | UnknownSymbol():
                 return self._array_value(symbol, span) if symbol.shape else self.element(symbol, ())
+            # its expression, with the indices of the loops around
             case Definition():
                 if symbol.at and not symbol.implied:
                     raise self._report_array(symbol.name, span)
@@ -185,6 +191,7 @@ class Names(Context):
             case BundleNode():
                 names = ", ".join(f"{symbol.name}.{m}" for m in symbol.members)
                 raise self.fail("E104", f"'{symbol.name}' is a bundle, not a value", span, help=f"its nodes: {names}")
+            # nodes, constraints and elements: the member that may be meant
             case NodeSymbol() | PortSymbol():
                 domain = symbol.domain if isinstance(symbol, NodeSymbol) else symbol.end.domain
                 shown = " ".join(self.source.text[span.start : span.end].split())
@@ -198,6 +205,7 @@ class Names(Context):
                 outputs = [n for n, d in said.items() if isinstance(d, Definition) and d.kind == "output"]
                 help_ = "a member: " + " or ".join(f"{symbol.name}.{n}" for n in outputs or ("e", "f"))
                 raise self.fail("E104", f"element '{symbol.name}' is not a value", span, help=help_)
+            # kinds of things, tables and functions without arguments
             case DomainSymbol() | BundleSymbol() | ComponentSymbol() | TableSymbol() | FunctionSymbol():
                 remedy = habits.name(symbol.name, self.source.text, span.start, self._moves)
                 message, called = f"'{symbol.name}' is not a value", None
@@ -265,12 +273,14 @@ class Names(Context):
         """The expression of a definition, resolved once where it was written (where a loop runs over several statements
         of a label that it reads, in each of its parts); E105 where it needs itself.
         """
+        # let a = b, let b = a
         if symbol in self._active:
             place = Place(symbol.space.source, symbol.span)
             message, help_ = circular(self._active[self._active.index(symbol) :])
             self.report.error("E105", message, place, help=help_)
             raise Failed
         key = symbol, self.virtual
+        # resolved before; None: with an error, which is reported
         if key in self._values:
             value = self._values[key]
             if value is None:
@@ -278,6 +288,7 @@ class Names(Context):
             return value
         self._values[key], before = None, self.chosen_read
         self._active.append(symbol)
+        # loop variables of the definition stand for themselves until indices are given
         placeholders = {n: Typed(ex.index(f"{symbol.name}.{n}"), NONE) for n in symbol.at}
         try:
             loops = symbol.loops or symbol.space.loops
@@ -291,11 +302,13 @@ class Names(Context):
                     value = Typed(ex.add(value.node, symbol.beside), value.dimension, value.truth)
                 if self.virtual and symbol.kind in ("output", "input"):
                     value = _signal(value)
+        # a range over several statements of one label: its reader knows which part it means
         except SeveralError as several:
             del self._values[key]  # where it is read, the range is known
             if any(several.loop == n.node.data for n in placeholders.values()):
                 raise self.spread(several, symbol.span) from None
             raise
+        # reads what is not known yet: again when it is
         except NotYetError:
             del self._values[key]
             raise
@@ -305,6 +318,7 @@ class Names(Context):
         finally:
             self._active.pop()
         self._values[key] = value
+        # depends on the part of a loop that is read: not kept
         if self.chosen_read != before:
             del self._values[key]
         return value
@@ -313,14 +327,17 @@ class Names(Context):
         """A value as its declaration wants it: of its dimension (E207), an input's of its shape (E805)."""
         items = value.items if isinstance(value, Vector) else (value,)
         wrong = next((i.dimension for i in items if i.dimension not in (None, symbol.dimension)), None)
+        # `input u: N = 3 m`
         if symbol.dimension is not None and wrong is not None:
             declared = dim.show(symbol.dimension)
             message = f"{symbol.kind} '{symbol.name}' is declared {declared} but set to {dim.show(wrong)}"
             help_ = self.missing(wrong, symbol.dimension, symbol.expression)
             raise self.fail("E207", message, symbol.expression.span, help=help_)
+        # only an input says its size
         if symbol.kind != "input" or (not symbol.shape and isinstance(value, Typed)):
             return value
         message = f"input '{symbol.name}' is one number, not an array"
+        # a list of the declared length
         if symbol.shape:
             (first, last), *others = symbol.shape
             size = last.data - first.data + 1 if ex.is_const(first) and ex.is_const(last) and not others else None

@@ -86,11 +86,13 @@ class Paths(Names):
         """The statement of a label that an element comes from; SeveralError where a loop runs over several, E805 where
         sizes without a value leave it open.
         """
+        # parts of a loop that were chosen around
         for k, a in enumerate(at):
             chosen = self.chosen.get((id(symbol), k, a))
             if chosen is not None:
                 self.chosen_read += 1
                 spaces = [s for s in spaces if any(s is c for c in chosen)]
+        # an index that runs over several statements: R[1..3] and R[4..9] written apart
         for k, a in enumerate(at) if len(spaces) > 1 else ():
             loop = next((n for n in ex.topological([a]) if n.op == "index"), None)
             ranges = tuple(dict.fromkeys(_range(s, k, len(at)) for s in spaces))
@@ -100,6 +102,7 @@ class Paths(Names):
                 cut = [Part(s, *(ex.sub(b, offset) for b in bounds)) for s, bounds in zip(alike, ranges, strict=True)]
                 met = [part for part in cut if self._meets(loop, part, sized=len(at) > 1)]
                 raise SeveralError(symbol.name, (id(symbol), k, a), loop.data, tuple(met or cut[:1]))
+        # the statement whose range holds the index
         inside = [s for s in spaces if self._holds(s, at)]
         if not inside:
             message = f"which statement of '{symbol.name}' has the element [{', '.join(map(str, at))}] is not known"

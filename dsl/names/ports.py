@@ -75,6 +75,7 @@ class Ports(Quantities):
         """`instance.port`, `instance.port[i]`."""
         inner, indices = (e.base, e.indices) if isinstance(e, syntax.Item) else (e, ())
         names, owner, base = list[str](), inner, None
+        # the instance, and the names behind it: port, or bundle and member
         while isinstance(owner, syntax.Member) and not (base and isinstance(base.symbol, InstanceSymbol)):
             names, owner = [owner.name, *names], owner.base
             base = self.locate(owner)
@@ -84,9 +85,11 @@ class Ports(Quantities):
         name, port = ".".join(names), space.scope.symbols.get(names[0])
         for member in names[1:]:
             port = port.members.get(member) if isinstance(port, BundleNode) else None
+        # several nodes at once
         if isinstance(port, BundleNode):
             each = ", ".join(f"{self._excerpt(e)}.{m}" for m in port.members)
             raise self.fail("E102", f"'{self._excerpt(e)}' is a bundle of ports", e.span, help=f"one of {each}")
+        # an array of ports by its index, or a single one
         array, end = _array_of(space, name), None
         if array is not None:
             own = (*array.family.prefix, *self.indices(name, array.family.shape, indices, e.span))
@@ -95,6 +98,7 @@ class Ports(Quantities):
             end = port.end
         if end is None:
             raise self.fail("E407", f"'{self._excerpt(owner)}' has no port '{name}'", e.span)
+        # two ports at one node: how the flow divides is not known
         others = [p.name for p in _ports(space.scope.symbols.values()) if p is not port and _meet(p.end, end)]
         arrays = ((n, _array_of(space, n)) for n in space.scope.symbols if n != name)
         others += [n for n, a in arrays if a and end.node and a.family.name == end.node.family.name]

@@ -60,8 +60,10 @@ class Quantities(Paths):
     def node_quantity(self, end: End, e: syntax.Member) -> Typed:
         """Member e of a common-effort node, q and f of a common-flow node."""
         domain = end.domain
+        # a node that is a coordinate has its quantities
         if end.node is not None and end.node.coordinate is not None:
             return self.coordinate_quantity(end.node.coordinate, end.at, e)
+        # an electrical node has a potential, and no flow of its own
         if domain.common == "effort":
             if e.name != "e":
                 shown = self._excerpt(e.base)
@@ -75,10 +77,13 @@ class Quantities(Paths):
             if end.node is None:
                 return Typed(ex.const(0.0), domain.effort.dimension)
             return Typed(ex.var(end.node.family.name, "ne", *end.at), domain.effort.dimension)
+        # a mechanical node has q, f, p, and e = p'
         kinds = {"q": ("nq", domain.displacement.dimension), "f": ("nf", domain.flow.dimension)}
         kinds["p"] = ("np", domain.momentum.dimension)
         kinds["e"] = ("np", domain.effort.dimension)  # p' = e
+        # sums of efforts by their kind
         if e.name in EFFORT_CLASSES:
+            # ground: all its quantities are zero
             if end.node is None:
                 raise self.fail("E102", f"'{self._excerpt(e.base)}' stands still: no effort moves it", e.span)
             return self._effort(end.node.family.name, "n", end.at, domain.effort.dimension, e)
@@ -119,16 +124,20 @@ class Quantities(Paths):
         family, domain = symbol.family, symbol.domain
         at = (*family.prefix, *at)
         meant = habits.variable(domain.name, name)
+        # `R1.i`: written with the letter of the language
         if meant is not None and (name not in BRANCH or not self._is_store(symbol, name)):
             shown = self._excerpt(e.base)
             raise self.fail("E102", f"'{shown}' has no member '{name}'", e.span, help=f"write {shown}.{meant}")
         if name not in BRANCH:
             raise self.no_member(self._excerpt(e.base), e, BRANCH if nearest(name, BRANCH) else branch_words(domain))
         power = multiply(domain.effort.dimension, domain.flow.dimension)
+        # e f
         if name == "power":
             return Typed(ex.mul(ex.var(family.name, "be", *at), ex.var(family.name, "bf", *at)), power)
+        # what was absorbed since the start
         if name == "energy":
             return Typed(self._absorbed_energy(symbol, at, power, e), multiply(power, dim.TIME))
+        # an element without momentum: the integral of its effort
         if name == "p" and self.complete and self._has_no_momentum(symbol):
             return Typed(self._impulse(symbol, at, e), branch_dimension(domain, "p"))
         if name in MEMBERS:

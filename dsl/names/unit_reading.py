@@ -30,13 +30,16 @@ def read_unit(
 
 
 def _read(unit: syntax.Unit, scope: Scope, source: SourceText, report: Report, bound: Container[str]) -> Unit | None:
+    """The unit that a text means, its factors looked up; None after reporting a factor that is no unit (E201)."""
     dimension: Dimension = NONE
     scale = Fraction(1)
     for factor in unit.factors:
         if factor.name == "1":
             continue
+        # with an offset, by itself alone
         if factor.name == "degC" and len(unit.factors) == 1 and factor.exponent == 1:
             return DEGREE_CELSIUS
+        # units of the text before those of the SI
         declared = scope.unit(factor.name)
         found = (declared.dimension, declared.scale) if declared else find_unit(factor.name)
         if found is None and scope.is_broken(factor.name):
@@ -50,6 +53,7 @@ def _read(unit: syntax.Unit, scope: Scope, source: SourceText, report: Report, b
             return None
         power = factor.exponent if factor.op == "." else -factor.exponent
         dimension = multiply(dimension, found[0], power)
+        # m^1000
         if not -100 <= power <= 100:
             report.error(
                 "E201", f"the exponent {factor.exponent} of a unit is out of reason", Place(source, factor.span)
@@ -63,6 +67,7 @@ def _read(unit: syntax.Unit, scope: Scope, source: SourceText, report: Report, b
 
 def _report_factor(unit: syntax.Unit, factor: syntax.UnitFactor, in_sight: bool, place: Place, report: Report) -> None:
     """Report a factor of a unit that nobody declared, with what is near."""
+    # `$u` outside of a component
     if factor.name.startswith("$"):
         report.error(
             "E209",
@@ -80,18 +85,22 @@ def _report_factor(unit: syntax.Unit, factor: syntax.UnitFactor, in_sight: bool,
     alone = number is not None and len(unit.factors) == 1 and factor.exponent == 1
     plain = expand_suffix("1" + factor.name) if alone and factor.name.isalpha() else None
     before = unit.text[: factor.span.start - unit.span.start].rstrip("./")
+    # `4 N/V` with a variable V: a quotient was meant
     if in_sight and before:
         sign = "/" if factor.op == "/" else "*"
         verb = "divide" if factor.op == "/" else "multiply"
         before = quantity.removesuffix(unit.text) + before
         help_ = f"to {verb} by the variable {factor.name} write '{before} {sign} {factor.name}'"
+    # `2 x`: a product
     elif number is not None and alone and (in_sight or factor.name == "pi"):
         help_ = f"factors are joined by '*': {number.group().strip()}*{factor.name}"
+    # `10 k`: a suffix of circuit simulators
     elif number is not None and plain is not None:
         example = PREFIXED.get(plain[1:], "kohm")
         help_ = f"{number.group().strip()}{plain[1:]}, or with its unit, as in '1 {example}'"
     else:
         help_ = _meant(unit, factor)
+        # a spelling that is certain can be mended
         right = correct_spelling(unit.text)
         if right is not None:
             edit = Edit(Place(place.source, unit.span), right)
@@ -103,6 +112,7 @@ _SPELLED = dict.fromkeys(("celsius", "Celsius", "centigrade"), "degC")
 
 def _meant(unit: syntax.Unit, factor: syntax.UnitFactor) -> str | None:
     """The unit as it is written here: by rewriting; else the line that would declare it, else the nearest name."""
+    # from certain to vague: another spelling, upper and lower case, a declaration, a near name
     right = _SPELLED.get(unit.text) or correct_spelling(unit.text)
     if right is not None:
         return f"write '{right}'"

@@ -112,14 +112,18 @@ def build_tables(*, strict: bool = False) -> Tables:
     lookaheads: dict[tuple[str, ...], int] = {}
     states = []
     gotos = []
+    # a row of actions by sets of terminals, a row of gotos by left sides
     for state in order:
         by_action: dict[int, set[str]] = {}
         goto = []
         for symbol, (action, target) in sorted(automaton.states[state].items(), key=_symbol):
+            # negative: the number of a rule
             if action.name == "Reduce":
                 code = -1 - rules.setdefault(target, len(rules))
+            # a terminal: the state behind it
             elif symbol in kinds:
                 code = number[target]
+            # a left side: where to go on after a reduction
             else:
                 goto.append((symbol, number[target]))
                 continue
@@ -183,6 +187,7 @@ def _rule(rule: Any) -> str:
     missing = options.empty_indices or (False,) * len(rule.expansion)
     children: list[str] = []
     position = 0
+    # a `-` for an optional part that is not there
     for absent in missing:
         if absent:
             children.append("-")
@@ -192,6 +197,7 @@ def _rule(rule: Any) -> str:
             spliced = not symbol.is_term and symbol.name.startswith("_")
             children.append(f"{position}{'*' if spliced else ''}")
         position += 1
+    # the function that builds the node; `_body` and its like make lists
     name = rule.alias or rule.origin.name
     if rule.alias is None and rule.origin.name.startswith("_"):
         name = "[]"

@@ -58,6 +58,7 @@ def _run_automaton(source: SourceText, until: int | None = None) -> Automaton:
         kind = scanner.read(automaton.row)
         if scanner.start == until:
             break
+        # slips that are certain are corrected on the way
         kind = recovery.correct_terminal(kind)
         if not automaton.advance(kind):
             recovery.recover(kind)
@@ -65,6 +66,7 @@ def _run_automaton(source: SourceText, until: int | None = None) -> Automaton:
             recovery.too_deep()
         elif automaton.overflow:
             recovery.too_long()
+        # lines that are alike are read by a recipe
         else:
             patterns.follow(kind)
     return automaton

@@ -60,18 +60,22 @@ class Asked:
         self._parameters: Mapping[str, Parameter] = model.parts.parameters
         self._elements = tuple(elements)
         conditions = [(r.condition, r.loops) for r in model.parts.requirements]
+        # a linear law has a modulus that is not negative
         for branch in model.parts.branches:
             slope = modulus(branch)
             if slope is not None:
                 conditions.append((ex.compare(">=", slope, ex.const(0.0)), branch.loops))
+        # nor is a bound of friction
         for bound, draft in friction_bounds(model):
             conditions.append((ex.compare(">=", bound, ex.const(0.0)), draft.loops))
+        # sizes are whole numbers
         for name in sorted(model.resolver.whole):
             parameter = model.parts.parameters.get(name)
             if parameter is not None and parameter.values and not parameter.shape:
                 size = ex.param(name)
                 conditions.append((ex.compare("==", size, ex.call("floor", size)), ()))
         self._conditions = [(c, loops, self._read(c, loops)) for c, loops in conditions]
+        # nonlinear dissipators are judged by samples
         bent = (b for b in model.parts.branches if b.kind == "dissipator" and not b.domain.pseudo)
         self._laws = [(b, self._read(b.law, b.loops)) for b in bent if b.law is not None and modulus(b) is None]
         self._of: dict[frozenset[str], Conditions] = {}

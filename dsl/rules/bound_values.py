@@ -44,6 +44,7 @@ def run(model: Elaborator, known: Values, report: Report, observations: Iterable
     if not _sizes(model, known, report) or not _elements(model, known, report):
         return  # the others go through every element
     _allowances(model, known, report)
+    # `require` of parameters alone: once for each element under its loops
     for r in model.parts.requirements:
         read = min(map(str, ex.variables(r.condition)), default=None)
         if read is not None:
@@ -51,6 +52,7 @@ def run(model: Elaborator, known: Values, report: Report, observations: Iterable
             message = f"require {text} reads '{read}', which is no parameter: it changes in a run"
             report.error("E322", message, r.place, help=f"expect always: {text}")
             continue
+        # the first element for which it fails
         for at in r.failures(known):
             met = {n: known.number(n, at) for n in _parameters(r.condition)}
             if not any(map(math.isnan, met.values())):
@@ -61,6 +63,7 @@ def run(model: Elaborator, known: Values, report: Report, observations: Iterable
                 report.error("E322", f"require {text} fails: {shown}", r.place, help=f"values for which {text}")
                 break
     traced = [(o.expression, (), o.place) for o in observations]
+    # division by zero anywhere, also in what is traced
     for node, loops, place in (*looped_expressions_of(model), *traced):
         if not _report_constants(node, place, report):
             _divisions(model, node, tuple(loops), place, known, report)
@@ -233,6 +236,7 @@ OVERLAP = "bounds that do not overlap with these sizes"
 def _branches(model: Elaborator, known: Values, report: Report) -> None:
     """E106: an element of an array that several statements make."""
     pieces: dict[str, list[Branch]] = {}
+    # pieces of one array: R[1..3] and R[3..5]
     for branch in model.parts.branches:
         if branch.at:
             pieces.setdefault(re.sub(r"\[[^]]*\]", "", branch.name), []).append(branch)  # `X[2].R` is a piece of X.R
@@ -242,6 +246,7 @@ def _branches(model: Elaborator, known: Values, report: Report) -> None:
         label = (inside or [name])[0].partition("#")[0]  # what bears the index: a component, or the element itself
         if len(made) < 2 or label in told:
             continue
+        # an element that two of them make
         counts = _count_elements([(branch.at, branch.loops) for branch in made], known)
         for element in (element for element, number in counts.items() if number > 1):
             told.add(label)
@@ -315,16 +320,19 @@ def _count(loops: Sequence[Loop], known: Values) -> float:
 
 
 def _indices(model: Elaborator, known: Values, report: Report) -> None:
+    """E805: indices outside of their array, lists of another length, indices that are no whole numbers."""
     for use in model.resolver.uses:
         low, high = known.bounds(use.value, use.loops)
         first, last = (known.number(b) for b in use.shape)
         if any(math.isnan(v) for v in (low, high, first, last)) or low > high:
             continue
         wrong = low if low < first else high if high > last else None
+        # x[1..n] = [a, b]: as many values as elements
         if use.given is not None:
             if low != first + use.given - 1.0:
                 message = f"'{use.name}' has {low - first + 1.0:g} elements there, {use.given} are given"
                 report.error("E805", message, use.place, help="a value for each element, or one for all")
+        # x[n+1] of x[1..n]
         elif wrong is not None:
             span = use.place.span
             written = " ".join(use.place.source.text[span.start : span.end].split())

@@ -61,10 +61,12 @@ def _loose(model: Elaborator) -> list[tuple[str, ...]]:
     parts = model.parts
     names = dict.fromkeys([*(n.name for n in parts.nodes if n.domain.common == "effort"), ""])
     joined = Joined[str]()
+    # branches join their ends
     for branch in parts.branches:
         ends = _ends(branch)
         if all(e in names for e in ends):
             joined.join(*ends)
+    # a potential that an equation reads is tied to something
     for node in ex.topological(expressions(parts, "constraints", "energies", "works")):
         family = _effort(node)
         if family in names and family is not None:

@@ -60,6 +60,7 @@ def _lonely_nodes(model: Elaborator, known: Values, read: frozenset[str], report
     touched: dict[str, float] = {}
     empty: dict[str, list[str]] = {}
     boxes: dict[str, list[Box]] = {}
+    # how many elements end at each node; of arrays the boxes of indices
     for branch, terminal in _ends(model.parts.branches):
         assert terminal.node is not None
         count = _count(branch, known)
@@ -71,6 +72,7 @@ def _lonely_nodes(model: Elaborator, known: Values, read: frozenset[str], report
             boxes.setdefault(terminal.node, []).append(tuple((min(b), max(b)) for b in found))
     mentioned = read | _read_nodes(model)
     alike: dict[str, list[str]] = {}
+    # an electrical node needs two ends, a mechanical one, of a family each element some
     for node in model.parts.nodes:
         alike.setdefault(_beginning(node), []).append(node.name)
     for node in model.parts.nodes:
@@ -80,8 +82,10 @@ def _lonely_nodes(model: Elaborator, known: Values, read: frozenset[str], report
         if node.name in mentioned or node.name in PREDEFINED or not size > 0 or math.isnan(count):
             continue
         near = alike[_beginning(node)][: NEAR + 1]
+        # too few altogether
         if count < wanted:
             _lonely(node, count, near, empty.get(node.name, []), report)
+        # elements of the family that none touches
         elif node.shape and (left := _first_untouched(node, boxes.get(node.name, []), known)) is not None:
             message = f"node '{node.name}[{box_text(left)}]' touches no element"
             report.error("E409", message, node.place, help="connect it to an element, or declare fewer nodes")
@@ -124,14 +128,17 @@ def _loops_of_sources(model: Elaborator, report: Report) -> None:
     joined = Joined[_End]()
     blocked = _constrained_at_times(model)
     for branch in model.parts.branches:
+        # sources of the common quantity between two nodes: effort sources of an electrical network
         if branch.kind != branch.domain.common or branch.loops or branch.plus is None or branch.minus is None:
             continue
         if (branch.name, "bf" if branch.kind == "effort" else "be") in blocked:  # then it fixes nothing
             continue
         plus, minus = ((branch.domain.name, t.node, t.at) for t in (branch.plus, branch.minus))
+        # a tree as yet: kept for its paths
         if joined.join(plus, minus):
             found.append((plus, minus, branch.name))
             continue
+        # closes a loop: the sources around it
         names = ", ".join((*_between(found, plus, minus), branch.name))
         message = f"loop of {branch.kind} sources: {names} fix the {branch.kind} between two nodes twice"
         if plus == minus:
@@ -151,11 +158,13 @@ def _constrained_at_times(model: Elaborator) -> set[tuple[str, str]]:
 def _between(tree: list[tuple[_End, _End, str]], start: _End, goal: _End) -> list[str]:
     """Names of the sources of a tree on the way between two of its ends, in the order of the text."""
     touching: dict[_End, list[int]] = {}
+    # which sources touch each end
     for k, (plus, minus, _) in enumerate(tree):
         touching.setdefault(plus, []).append(k)
         touching.setdefault(minus, []).append(k)
     came: dict[_End, tuple[_End, int] | None] = {start: None}
     left = [start]
+    # depth first from the start, remembering whence
     while goal not in came:
         here = left.pop()
         for k in touching[here]:
@@ -165,6 +174,7 @@ def _between(tree: list[tuple[_End, _End, str]], start: _End, goal: _End) -> lis
                 came[other] = here, k
                 left.append(other)
     way = []
+    # back from the goal
     while (step := came[goal]) is not None:
         goal = step[0]
         way.append(step[1])
@@ -264,6 +274,7 @@ def _check_modulus(branch: Branch, slope: Node | None, own: Node, known: Values,
 
 
 def _negative(branch: Branch, shown: str, report: Report) -> None:
+    """Report a modulus below zero: E321 of an inertia, E325 of a stiffness, capacitance, resistance or damping."""
     name = branch.name.rpartition("#")[0] or branch.name
     if branch.kind == "kinetic":
         message = f"'{name}': the inertia is negative ({shown}): the motion is not determined forward in time"

@@ -70,9 +70,11 @@ def _stores(model: Elaborator, path: str) -> Iterator[str]:
 
 def _powers(model: Elaborator, path: str) -> Iterator[_Part]:
     """What absorbs power inside a component."""
+    # dissipators and sources inside
     for b in model.parts.branches:
         if b.kind in WHAT and _inside(b.name, path) and b.law is not None:
             yield f"'{b.name}' is {WHAT[b.kind]}", b.loops, _power(b, b.law)
+    # works, contents, and constraints that move with time
     for s in _statements_of(model, path):
         if isinstance(s, Work):
             yield "a work", s.loops, ex.neg(ex.mul(s.effort, _rate(s.on)))

@@ -16,6 +16,7 @@ def command(console: Console, topic: str | None, html_file: str | None) -> int:
     """Explain TOPIC, a page of the language; a command or a code of a finding too. Without TOPIC: the index."""
     from sysdyn.cli.manual import topics
 
+    # all topics as one page
     if html_file is not None:
         if topic is not None:
             raise UsageError("--html writes all topics: leave the topic out")
@@ -26,10 +27,12 @@ def command(console: Console, topic: str | None, html_file: str | None) -> int:
             console.say(html_file)
         console.result = {"file": html_file}
         return console.finish()
+    # the index
     if topic is None:
         console.result = {"topics": [{"name": t.name, "title": t.title} for t in topics.topics().values()]}
         console.data(f"sysdyn help TOPIC\n\n{topics.index()}\n\n{_OTHER}")
         return console.finish()
+    # a topic; else a command, or the code of a finding
     page = topics.find_topic(topic.lower())
     text = topics.page(page) if page else _elsewhere(topic)
     if text is None:

@@ -41,6 +41,7 @@ def command(
     FILES may be folders (all .sd files below them) and patterns ('models/**/*.sd'). The forms concise, github, junit
     and sarif go to standard output.
     """
+    # folders and patterns become files
     given, files = files, tuple(targets.files(files))
     console.explain = explain
     _form(console, output_format, files)
@@ -49,6 +50,7 @@ def command(
     if fix and "-" in files:
         raise UsageError("--fix writes files: standard input is none")
     refused = strict and not allow_unsupported
+    # once
     if not watch:
         return _all(console, files, refused, jobs, strict=strict, fix=fix)
     if "-" in files or console.as_json or output_format in ("junit", "sarif"):
@@ -56,6 +58,7 @@ def command(
     from sysdyn.cli.run.check import watching
 
     seen = watching.stamps(given)
+    # then whenever a file changes
     while True:  # until it is interrupted
         console.renew()
         code = _all(console, tuple(targets.files(given)), refused, jobs, strict=strict, fix=fix)
@@ -67,6 +70,7 @@ def _all(console: Console, files: Sequence[str], refused: bool, jobs: int | None
     """Check the files and show what was found; the exit code."""
     results, unread = [], False
 
+    # a file is mended before it is checked
     def mend_and_check(asked: tuple[str, bool, bool]) -> Checked:
         """In this process, behind the repair."""
         try:
@@ -79,15 +83,18 @@ def _all(console: Console, files: Sequence[str], refused: bool, jobs: int | None
         return found if found.result is None else replace(found, result=found.result | changes)
 
     asked = [(path, refused, console.explain) for path in files]
+    # in processes, in the order of the files
     for path, found in zip(
         files, each(file_checked, asked, 1 if fix or "-" in files else jobs, mend_and_check), strict=True
     ):
+        # a process that died is no finding
         if isinstance(found, Lost):
             raise RuntimeError(f"the process that checked {path} died ({found.how})")
         console.report.extend(found.found)
         for said, text in found.said:
             (console.data if said == "data" else console.say)(text)
         results += [] if found.result is None else [found.result]
+        # a file that cannot be read
         if found.unread is not None:
             unread = True
             console.complain(found.unread, INPUT_OUTPUT)

@@ -41,6 +41,7 @@ def command(console: Console, folder: str | None, dump: str | None, explain: boo
         network = network_of(request, console.report)
         if network is None:
             return console.finish(1)
+        # before anything is compiled
         if dump == "network":
             console.result = {"stage": dump, "text": network_text.show(network)}
             console.data(console.result["text"])
@@ -49,6 +50,7 @@ def command(console: Console, folder: str | None, dump: str | None, explain: boo
         prepared = prepare(network, console.report, formulation=request.formulation, backend=backend, prune=prune)
         if prepared is None:
             return console.finish(1)
+        # a stage of the compiler as text
         if dump:
             made = prepared.compiled
             stages = {
@@ -60,6 +62,7 @@ def command(console: Console, folder: str | None, dump: str | None, explain: boo
             }
             console.result = {"stage": dump, "text": stages[dump]()}
             console.data(console.result["text"])
+        # files, beside a dump only where a folder is named
         if dump is None or folder is not None:
             _write(console, prepared, request.index, Path(folder or "."))
     if explain:

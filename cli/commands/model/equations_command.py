@@ -39,9 +39,11 @@ def command(console: Console, form: str, alphabet: str, no_prune: bool, index: s
 
     with ex.fresh():
         request = Request(index=index, **{**options, "backend": "numpy"})
+        # the linear form alone moves inputs
         inputs = None if form == "linear" else ()
         made = compile_target(request, console.report, inputs=inputs, choose=still)
         lagranges = made is not None and made[1].formulation == "lagrangian"
+        # Hamilton's equations, where nobody named another formulation
         if form == "canonical" and lagranges and request.formulation in (None, "auto"):  # nobody named them
             made = compile_target(
                 replace(request, formulation="hamiltonian"), console.report, inputs=inputs, choose=still
@@ -49,6 +51,7 @@ def command(console: Console, form: str, alphabet: str, no_prune: bool, index: s
         if made is None:
             return console.finish(1)
         target, prepared = made
+        # a form that the model does not have is said as a finding
         try:
             content = content_of(target, prepared, form, request, console.report)
         except NoSuchEquations as error:
@@ -56,6 +59,7 @@ def command(console: Console, form: str, alphabet: str, no_prune: bool, index: s
             return console.finish(1)
         if content is None:
             return console.finish(1)
+        # the same content as text, LaTeX or a page
         sheet = Sheets(prepared.compiled, [c.name for c in prepared.network.coordinates]).sheet(content)
         if alphabet == "html":
             text = page(f"{target.name}: {prepared.formulation}, {form}", content, prepared.compiled)

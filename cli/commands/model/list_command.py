@@ -26,6 +26,7 @@ def command(
     from sysdyn.cli.manual import names
 
     document = targets.read(file, console.report)
+    # the model that is named, or all of the file
     chosen = [targets.whole(document, file, model, scene, console.report)] if scene or model else _models(document)
     accounts = []
     for target in chosen:

@@ -56,6 +56,7 @@ def command(
     The whole model is taken, also what the scene does not need. The matrices E, A, B, C, D are those of the form as
     written, or of --index; eigenvalues are those of the motion on the constraint manifold.
     """
+    # two places at once
     if at is not None and equilibrium:
         raise UsageError("--at together with --equilibrium: an instant of a run, or a state of rest")
     kinds = _kinds(response)
@@ -97,8 +98,10 @@ def command(
     if found.prepared.network.discretes:
         console.say(f"events do not act: {', '.join(sorted(found.prepared.network.discretes)[:6])} held")
     parts = [_table(linear)]
+    # curves are computed where a kind or a picture asks for them
     pictures = any(Path(file).suffix in PICTURES for file in files)
     curves = answers.answers(linear) if kinds or pictures else ()
+    # in text and in --json
     if kinds:
         console.result["responses"] = [answers.answer_to_json(a, kinds) for a in curves]
         parts += [answers.answer_to_text(a, kinds) for a in curves]
@@ -108,6 +111,7 @@ def command(
         console.result["locus"] = answers.locus_to_json(over)
         parts.append(answers.locus_to_text(over))
     console.results("\n\n".join(parts))
+    # data and pictures
     for file in files:
         _write(file, linear, curves, over, kinds, found.target.name, console)
     if files:
@@ -123,6 +127,7 @@ def _along(text: str, found: Any) -> tuple[str, list[float]]:
 
     known = {p.name: p.unit.dimension for p in found.prepared.network.parameters}
 
+    # values in the unit of the parameter
     def evaluate(name: str, said: str) -> float | None:
         plain = name.partition("[")[0]
         if plain not in known:
@@ -136,6 +141,7 @@ def _along(text: str, found: Any) -> tuple[str, list[float]]:
     values = [v for v in along.values if isinstance(v, float)]
     if along.name.partition("[")[0] not in known:
         raise UsageError(f"--locus: there is no parameter '{along.name}'; there are: {', '.join(known) or 'none'}")
+    # a grid or a list of numbers
     if along.drawn or len(values) != len(along.values) or not 2 <= len(values) <= MOST:
         raise UsageError(f"--locus '{text}': NAME=FIRST..LAST:NUMBER, or a list of 2 to {MOST} numbers")
     return along.name, values
@@ -270,6 +276,7 @@ def _result(linear: Any, formulation: str, index: str) -> dict[str, Any]:
         "formulation": formulation,
         "index": index,
     }
+    # outputs by rates: only where there are such
     if form.cd.any():
         result["Cd"] = form.cd.tolist()
     for name, part in (("D1", small.d1), ("D2", small.d2)):

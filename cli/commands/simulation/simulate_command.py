@@ -37,6 +37,7 @@ def command(console: Console, progress: str, no_timings: bool, **options: Any) -
     if request.output == "-" and console.as_json:
         raise UsageError("-o - and --json both want standard output")
     with console.progress(progress) as line:
+        # HDF5 to standard output is made in a file first
         ran = (
             _simulate_to_stream(request, console, line)
             if _streams(request.output)
@@ -45,10 +46,12 @@ def command(console: Console, progress: str, no_timings: bool, **options: Any) -
     if ran is None:
         return console.unable()
     console.result = _result(ran)
+    # how the start was found, what it moved, what the run warns of
     found = strategy_note(ran.started.state)
     moves = first_lines(change_lines(ran.prepared, ran.started.state))
     for text in (*moves, *([found] if found else []), *ran.outcome.warnings):
         console.say(text)
+    # expectations of a run that is not met are shown, and not judged
     if ran.outcome.judgement is not None and not ran.outcome.met:
         for claim in ran.claims:
             found = "" if claim.value is None else f": {claim.value:.9g} at {claim.time:.9g} s"
@@ -83,6 +86,7 @@ def _simulate_to_stream(request: Request, console: Console, line: ProgressLine) 
 
 
 def _summary(ran: Ran) -> str:
+    """Two or three lines: how the run was made, its steps and error, what is conserved, where the trace is."""
     o = ran.outcome
     s, t = o.statistics, o.timings
     estimate = "" if o.error_estimate is None else f", estimated error {o.error_estimate:.1e}"
@@ -117,6 +121,7 @@ def _last(values: Any) -> float:
 
 
 def _result(ran: Ran) -> dict[str, Any]:
+    """The object of --json."""
     from sysdyn.cli.run.start.starting import change_lines
 
     o = ran.outcome

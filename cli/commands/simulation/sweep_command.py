@@ -68,6 +68,7 @@ def command(
     if plot is not None and Path(plot).suffix not in KINDS:
         raise UsageError(f"--plot '{plot}': one of {', '.join(KINDS)}")
     said: dict[str, Any] = {}
+    # a study: its options are defaults of those on the command line
     if file.endswith(".toml"):
         found = read(file)
         file, said = found.file, dict(found.options)
@@ -78,6 +79,7 @@ def command(
     kept = keep or said.get("keep") or "traces"
     if kept not in KEEPS:
         raise UsageError(f"keep = '{kept}': one of {', '.join(KEEPS)}")
+    # the model is loaded once, for all runs
     runner = Runner(request, kept)
     asked = study(
         axes_of(runner, over),
@@ -88,6 +90,7 @@ def command(
     scene = runner.load_model().target.scene
     named = default_output(file, scene.name.name if scene else "", "-sweep.h5")
     target = Path(output or said.get("output") or named)
+    # never over the model, nor over a file of others
     if target.suffix == ".sd" or (target.exists() and target.samefile(file)):
         raise UsageError(f"-o {target} is the model itself")
     if target.is_file() and not replaceable(target, sweep=True):
@@ -99,6 +102,7 @@ def command(
 
 
 def _show_results(console: Console, found: Swept, plot: str | None) -> int:
+    """Show table, picture and failed runs of a sweep; the exit code."""
     console.result = to_json(found)
     console.results(_table(found))
     if plot is not None:

@@ -56,6 +56,7 @@ def command(
     the search leaves most others out). A trade that was stopped goes on where it was.
     """
     target = _target(output)
+    # a lock stands beside its file
     if locks and options["file"] == "-":
         raise UsageError("--lock of a text from standard input: a lock stands beside a file")
     request = Request(**options)
@@ -68,10 +69,12 @@ def command(
         return console.finish(SOLVER)
     if found is None:
         return console.unable()
+    # the cheapest setting that meets the accuracy
     best = found.chosen
     use = "" if best is None else command_of(request, best, found.name)
     console.result = _result(found, use, timings=not no_timings)
     console.results(_table(found, timings=not no_timings))
+    # a page or a picture of all settings
     if target is not None:
         drawn = page(found, use).encode() if target.suffix == ".html" else picture(found, target.suffix[1:])
         whole_files.write(target, drawn)
@@ -160,6 +163,7 @@ def _table(found: Traded, *, timings: bool) -> str:
 
 
 def _best_of_each(found: Traded) -> list[Measured]:
+    """For each combination the cheapest setting that is accurate enough, else the most accurate; then the front."""
     best: dict[Combination, Measured] = {}
 
     def rank(m: Measured) -> tuple[bool, float]:
@@ -184,6 +188,7 @@ def _refusal_lines(refusals_: Iterable[Refusal]) -> list[str]:
 
 
 def _result(found: Traded, use: str, *, timings: bool) -> dict[str, Any]:
+    """The object of --json: settings, those that cannot be run too, the choice and the reference."""
     known, pareto = found.reference, found.pareto
     nothing = dict.fromkeys(("tolerance", "error", "cpu_s", "steps", "work", "energy", "constraints"))
     settings = [setting(m, pareto=m in pareto, timings=timings) for m in found.measured]

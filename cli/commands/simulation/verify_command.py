@@ -43,12 +43,14 @@ def command(
     from sysdyn.cli.verify.verification import verify
 
     request = Request(timings=not no_timings, **options)
+    # large models run at the sizes that their folder names for this
     path, reduced = (Path(), ()) if full else sizes(request.file)
     given = {name for name, _ in request.settings}
     reduced = tuple((name, value) for name, value in reduced if name not in given)
     if reduced:
         console.say(f"sizes of {path.parent.name}/{path.name}: {', '.join(f'{n} = {v}' for n, v in reduced)}")
     request = replace(request, settings=(*reduced, *request.settings))
+    # traces are kept where a folder is named
     folder = None if output is None else Path(output)
     if folder is not None:
         folder.mkdir(parents=True, exist_ok=True)
@@ -70,24 +72,30 @@ def _report_faults(found: Verified, console: Console) -> int:
     from sysdyn.cli.run.start.starting import first_lines
 
     code = 0
+    # disagreements
     for text in _complaints(found):
         console.complain(text, 1)
         code = 1
+    # runs that are not met
     for text in first_lines(_doubts(found)):
         console.complain(text, SOLVER)
         code = SOLVER
+    # balances that are off
     for text in first_lines(_ledger_lines(found)):
         console.complain(text, SOLVER)
         code = SOLVER
     for text in _warnings(found):
         console.say(text)
+    # runs that stopped
     for run in found.failures:
         console.complain(f"{run.name}: {run.failure}", SOLVER, run.finding)
         code = SOLVER
+    # nothing traced, or nothing that all runs have
     if not found.compared:
         why = "; ".join(f"{name}: {reason}" for name, reason in found.left_out) or "the scene traces nothing"
         console.complain(f"there is nothing to compare ({why}); 'trace NAME, ...' in the scene", SOLVER)
         return SOLVER
+    # chaotic from the start on, or too coarse
     if found.beyond is not None and not found.horizon > found.span[0]:
         text = f"{found.beyond.variable} of {found.by} differs at two accuracies from the start on"
         console.complain(f"the traces cannot be compared: {text}; a smaller --accuracy", SOLVER)
@@ -96,6 +104,7 @@ def _report_faults(found: Verified, console: Console) -> int:
 
 
 def _complaints(found: Verified) -> list[str]:
+    """Lines on what disagrees: starts, traces of runs that are met, compiled rows."""
     from sysdyn.cli.run.start.starting import first_lines
 
     pairs = []
@@ -226,6 +235,7 @@ def _horizon(found: Verified) -> str:
 
 
 def _verdict(found: Verified) -> str:
+    """One line: how many runs agree, or that they do not."""
     ended = [run for run in found.runs if not run.failure]
     number = len(ended)
     if found.apart or any(not d.doubted for d in found.disagreements) or not all(t.agree for t in found.twins):
@@ -241,6 +251,7 @@ def _verdict(found: Verified) -> str:
 
 
 def _result(found: Verified, *, keep: bool, timings: bool) -> dict[str, Any]:
+    """The object of --json."""
     runs = [
         _run_object(run, gap, keep=keep, timings=timings)
         for run, gap in zip((*found.runs, found.finer), found.worst, strict=True)
@@ -266,6 +277,7 @@ def _result(found: Verified, *, keep: bool, timings: bool) -> dict[str, Any]:
 
 
 def _run_object(run: Run, gap: Gap | None, *, keep: bool, timings: bool) -> dict[str, Any]:
+    """A run as an object of --json."""
     o = run.outcome
     return {
         "formulation": run.formulation,

@@ -44,7 +44,9 @@ def command(
     target, kind = destination(trace, output, console, KINDS, "what plays")
     found = open_trace(trace)
     film = animation.film(found, speed)
+    # points by their names, or the links that are given
     joined = animation.links_of(found, links)
+    # what moves a point needs no curve
     taken = animation.quantities_of(joined, found)
     drawn = quantities([found], list(names)) if names else [n for n in quantities([found], []) if n not in taken]
     picture = animation.drawing(film, joined, drawn)

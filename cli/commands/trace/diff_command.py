@@ -34,6 +34,7 @@ def command(
     Equal where abs(test - ref) <= atol + rtol * nominal within the time tolerance, in both directions, at all
     instants of both and between them. Exit 0 equal, 1 different, 3 not comparable.
     """
+    # options that can be told wrong before files are read
     for name, value in (("--rtol", rtol), ("--atol", atol)):
         if not 0.0 <= value < math.inf:
             raise UsageError(f"{name} {value:g}: it must be a number that is not negative")
@@ -49,14 +50,17 @@ def command(
 
     began = time.monotonic()
     try:
+        # both open at once: pages read them in parts
         with open_trace(ref) as one, open_trace(test) as two:
             verdict = differences(one, two, Tolerance(rtol, atol, wide))
             if html_file:
                 from sysdyn.cli.compare.comparison_page import page
 
                 whole_files.write(html_file, page(f"{test} against {ref}", [(one, two, verdict)]))
+            # traces of runs that stopped or are not met
             unfinished = [(t.path, "did not end as asked") for t in (one, two) if not t.final]
             unfinished += [(t.path, "is not met") for t in (one, two) if t.final and not t.met]
+    # no common quantity, or units of another dimension
     except Incomparable as error:
         console.complain(f"the traces cannot be compared: {error}", SOLVER)
         if junit_file:

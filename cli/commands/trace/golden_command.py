@@ -90,12 +90,15 @@ def record(
     if request.file == "-":
         raise UsageError("a golden trace belongs to a model in a file")
     target = targets.target_of(request, console.report)
+    # the report says why
     if target is None:
         return console.finish(1)
+    # a golden is of one scene, or of a model without
     scene, model = target.scene.name.name if target.scene else None, target.model.name.name
     request = replace(request, scene=scene, model=None if scene else model)
     label, file = scene or model, Path(request.file)
     place = Path(folder) / (name or file.stem)
+    # goldens of one model stand in one folder
     known = read(place) if (place / BOOK).is_file() else ()
     if not inside(file, project(Path(folder))):
         raise UsageError(f"{file} is outside of the project, {project(Path(folder))}: --folder gives its own")
@@ -103,6 +106,7 @@ def record(
         raise UsageError(f"{place} is of {known[0].model}: --name gives another folder")
     if any(g.name == label for g in known):
         raise UsageError(f"{place.name}/{label} is recorded already: 'sysdyn golden accept' renews it, with a reason")
+    # the record, with its own error measured
     found = _record_or_exit(console, request, rtol, atol, jobs)
     if isinstance(found, int):
         return console.finish(found)
@@ -153,12 +157,14 @@ def check(
     from sysdyn.cli.golden import book
 
     goldens = book.find(Path(folder), names)
+    # whether goldens notice changes of parameters
     if mutants:
         return _mutants(console, goldens, jobs)
     from sysdyn.cli.golden.jobs import Asked, in_processes
 
     drawn = bool(html_file) or pages
     cases = []
+    # as they come
     for found in in_processes([Asked(g, formulations, methods, backends or ("c",), drawn) for g in goldens], jobs):
         cases += found
         for case in found:
@@ -167,6 +173,7 @@ def check(
 
 
 def _report(console: Console, cases: Sequence[Case], junit_file: str | None, html_file: str | None, pages: bool) -> int:
+    """Show what the checks found, as text, JUnit and page; the exit code."""
     from sysdyn.cli.golden.changes import page
     from sysdyn.cli.golden.checking import checkable
     from sysdyn.cli.page.junit import junit
@@ -200,6 +207,7 @@ def _mutants(console: Console, goldens: Sequence[Golden], jobs: int | None) -> i
 
     found: list[Mutant] = []
     code = 0
+    # each golden's parameters changed by 1 %
     for golden, made in zip(goldens, each(mutate_golden, goldens, jobs), strict=True):
         mutants, stopped = made if isinstance(made, tuple) else ([], (SOLVER, f"its process died ({made.how})"))
         for mutant in mutants:
@@ -207,9 +215,11 @@ def _mutants(console: Console, goldens: Sequence[Golden], jobs: int | None) -> i
             word = {True: "noticed", False: "MISSED", None: "skipped"}[mutant.noticed]
             by = "" if mutant.noticed is None else f", {mutant.ratio:.3g} of the limit"
             console.say(f"{word:8} {mutant.golden} {mutant.parameter}{by}")
+        # a run that stopped, or a process that died
         if stopped is not None:
             console.complain(f"{golden.label}: {stopped[1]}", stopped[0])
             code = worst((code, stopped[0]))
+    # a parameter of zero cannot be changed by a share
     tried = [m for m in found if m.noticed is not None]
     missed = [m for m in found if m.noticed is False]
     zeros = len(found) - len(tried)
@@ -257,6 +267,7 @@ def accept(
     code, changes = 0, []
     goldens = book.find(Path(folder), names)
     renewed = [golden if rtol is None else replace(golden, rtol=rtol) for golden in goldens]
+    # recorded anew, compared with what is kept
     for golden, wanted, found in zip(goldens, renewed, _again(console, renewed, jobs), strict=True):
         if isinstance(found, int):
             code = worst((code, found))
@@ -265,8 +276,10 @@ def accept(
         changes.append({"golden": golden.label, "change": change})
         if not console.quiet:
             console.data(f"{golden.label}: {text}")
+        # nothing changed
         if change is None:
             continue
+        # shown, and refused
         if reason is None:
             code = worst((code, USAGE))
             continue
@@ -304,6 +317,7 @@ def list_(console: Console, folder: str) -> int:
     goldens = book.find(Path(folder))
     rows = [("golden", "rtol", "error", "kB", "formulations", "last reason")]
     items = []
+    # a line each, from the book and the trace's size
     for g in goldens:
         size = g.trace.stat().st_size / 1e3 if g.trace.is_file() else math.nan
         reason = g.accepted[-1].reason if g.accepted else ""
@@ -373,6 +387,7 @@ def _keep(console: Console, golden: Golden, found: Recorded, size: float) -> int
         "tau": golden.tau,
         "error": float(f"{golden.error:.2e}"),
     }
+    # written beside, and dropped where it is too large
     need = write_trace(golden.trace, found.trace, attributes, size * 1e3) / 1e3
     if need > size:
         message = f"{golden.label} would be {need:.0f} kB, more than {size:g}"

@@ -164,7 +164,7 @@ class Loaded:
         report.raise_if_failed()
 
     def keeping(self, *, extrema: bool) -> Loaded:
-        """The same text, and what is compiled of it, for runs that keep least and largest values, or do not."""
+        """The loaded text, and what is compiled of it, for runs that keep least and largest values, or do not."""
         other = copy.copy(self)
         other.request = replace(self.request, extrema=extrema)
         return other

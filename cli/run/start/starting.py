@@ -147,7 +147,7 @@ def changes_by_start(prepared: Prepared, state: ConsistentState) -> list[Moved]:
 
 
 def change_lines(prepared: Prepared, state: ConsistentState) -> list[str]:
-    """The same, a line each."""
+    """What the start moved, a line each."""
     return [
         f"{name}: {before:.6g} -> {after:.6g}, {why}" for name, before, after, why in changes_by_start(prepared, state)
     ]
@@ -336,7 +336,7 @@ def holds(operator: str, left: float, right: float, within: float) -> bool:
 
 
 def where_holds(operator: str, left: Any, right: Any, within: Any) -> Any:
-    """The same of arrays, sample by sample."""
+    """Where relations of arrays hold, sample by sample."""
     match operator:
         case "==":
             return np.abs(left - right) <= within

@@ -74,12 +74,15 @@ def _can_be_broken(table: Table, node: Node) -> bool:
 
 
 def _pieces(table: Table, u: Node, order: int, floors: Set[Node]) -> Node:
+    """A table with its pieces written out as conditions on its argument, so that corners are operations like others."""
     points, values = table.points[0], table.values
+    # an inequality keeps the argument off that end: the end's piece is continued
     bounded = (sub(u, const(points[0])) in floors, sub(const(points[-1]), u) in floors)
     ends = [
         _end(table, k, u, order) if on else const(0.0 if order else values[k])
         for k, on in zip((0, -1), bounded, strict=True)
     ]
+    # smooth inside: its ends alone
     if table.method in ("pchip", "cubic"):
         inside = looked_up(table.name, u, order=order)
         below = conditional(compare("<", u, const(points[0])), ends[0], inside)
@@ -94,6 +97,7 @@ def _pieces(table: Table, u: Node, order: int, floors: Set[Node]) -> Node:
         last = ends[1]
     pieces = [first, *inner, last]
     found = pieces[-1]
+    # nested from the last piece to the first
     for x, piece in zip(reversed(points), reversed(pieces[:-1]), strict=True):
         found = conditional(compare("<", u, const(x)), piece, found)
     return found

@@ -173,8 +173,12 @@ class _Freezer:
         return self.done[branch]
 
     def _frozen(self, node: Node, held: bool) -> Node:
+        """A node whose branch is chosen by the surface's number, as it is where no surface watches it; held: by senses
+        alone.
+        """
         args = tuple(self.done[a] for a in node.args)
         live = rebuild(node, args)
+        # a condition has no surface of its own: those it reads have
         if node.op == "cond":
             return self._conditional(node, live, held)
         k = self._surface_number(node)
@@ -182,18 +186,22 @@ class _Freezer:
         if k < 0 or found is None:
             return live
         mine = found.u in self.number
+        # true on one side, and at rest on it where it says so
         if node.op == "cmp":
             level = ABOVE if (found.above is YES) == mine else BELOW
             as_said = both(compare("==", self.branch[k], const(LIVE)), live)
             levels = (level, RESTS) if self.surfaces[k].jumps and node.data in (">=", "<=") else (level,)
             return either(as_said, *(compare("==", self.branch[k], const(b)) for b in levels))
+        # abs, sign, max, ...: both branches, frozen in turn
         above, below = (self._again(n) for n in ((found.above, found.below) if mine else (found.below, found.above)))
         at_rest = const(0.0) if node.data == "sign" else self._again(found.above)
         return self._branches(k, (above, at_rest, below), live, held)
 
     def _branches(self, k: int, sides: tuple[Node, Node, Node], live: Node, held: bool) -> Node:
+        """The branch that a surface stands on: above, below, at rest, live, or between where it slides."""
         (above, at_rest, below), branch, sense = sides, self.branch[k], self.sense[k]
         lower = below
+        # it may slide: a convex combination of both sides
         if sense is not None:
             part = linear(0.5, ((0.5, sense),))
             between = add(mul(part, above), mul(sub(const(1.0), part), below))
@@ -256,6 +264,7 @@ class _Freezer:
             add_to("observe", len(rows) - 1, expression)
             add_to("observe_scale", len(rows) - 1, magnitude(expression))
 
+        # each surface is watched, by its rate too where it has one
         for k, (surface, kink) in enumerate(zip(self.surfaces, self.kinks, strict=True)):
             self.done = {}
             u = self.freeze(surface.u)
@@ -264,12 +273,14 @@ class _Freezer:
             if kink.rate is not None and rate is not None:
                 observe(kink.rate, self.freeze(rate))
             sense = self.sense[k]
+            # it cannot slide
             if sense is None or rate is None:
                 continue
             owner = f"#sense {k}"
             senses.append(Unknowns(f"sense of {kink.text}", "e", owner, "1", kink.place))
             shapes.append((owner, ()))
             rows.append(Equations("gamma", f"sense of {kink.text}", owner, "gamma", "1", kink.place))
+            # a gamma for the sense: the surface itself while it slides, else the side
             slides = compare("==", self.branch[k], const(SLIDES))
             # a length is no number: its own scale makes it one (Newton judges a row by its terms)
             add_to("gamma", len(rows) - 1, conditional(slides, u, sub(sense, self.branch[k])))
@@ -282,6 +293,7 @@ class _Freezer:
         last = next((k for k, f in enumerate(families) if f.kind in BESIDE), len(families))
         blocks = tuple(self._block(b, added.pop(b.name, [])) for b in self.before.blocks)
         made = (*blocks, *(Block(name, (Kernel((), tuple(new)),)) for name, new in added.items()))
+        # blocks in the order of the contract, senses before what is observed
         order = {name: number for number, name in enumerate(BLOCKS)}
         ordered = sorted(made, key=lambda b: order.get(b.name, len(order)))
         with_senses = (*families[:last], *senses, *families[last:])

@@ -114,6 +114,7 @@ def surfaces(
     """
     first: dict[Node, int] = {}
     holding: dict[Node, dict[Node, None]] = {}
+    # which expressions hold each switching function; u and -u are one
     for root, row in roots(form):
         for node in topological([root]):
             found = watched_branches(node)
@@ -128,6 +129,7 @@ def surfaces(
         return ()
     kept: list[Surface] = []
     known: dict[tuple[Node, ...], int | None] = {}
+    # the least smooth of them decides
     for u, row in first.items():
         level = min(smoothness(root, u, known) for root in holding[u])
         if level < SMOOTH:
@@ -194,7 +196,7 @@ def smoothness(root: Node, u: Node, known: dict[tuple[Node, ...], int | None] | 
 
 
 def _number_leaves(nodes: tuple[Node, ...]) -> tuple[Node, ...]:
-    """The same text with leaves numbered as they come."""
+    """Nodes of the same text with leaves numbered as they come."""
     done: dict[Node, Node] = {}
     for node in topological(nodes):
         name = f"#{len(done)}"
@@ -211,11 +213,13 @@ def _classify_by_samples(u: Node, above: Node, below: Node) -> int | None:
     """By values on u = 0 of the two branches there; None where none are known."""
     others, found, known = _others((above, below), u), SMOOTH, False
     moved = _mover(u, others)
+    # no leaf moves u: never crossed
     if moved is None:
         return SMOOTH
     slopes = [derivative(node, moved) for node in (u, above, below)]
     if _ends((above, below), u, slopes[0], moved):
         return SMOOTH
+    # points on the surface: some near, some far out
     for k in range(SAMPLES + DRAWS * min(len(others), MANY)):
         asked = k < SAMPLES
         values = _on_surface(u, slopes[0], moved, _drawn((u,), k) if asked else _on_sides(others, u, k))
@@ -226,10 +230,12 @@ def _classify_by_samples(u: Node, above: Node, below: Node) -> int | None:
         try:
             here, there = _values(both, values), _values(both, beside)
         except (ArithmeticError, ValueError, KeyError, TypeError):
+            # no value at an ordinary point: a pole or the end of a domain
             if asked:
                 return JUMPS
             continue
         known = True
+        # values differ: a jump; slopes differ: a kink
         if _differ(here[:2], there[:2], asked=asked):
             return JUMPS
         if _differ(here[2:], there[2:], asked=asked):

@@ -44,7 +44,7 @@ def turning(root: Node) -> Iterator[Node]:
 
 
 def turns_in_conditions(root: Node) -> Iterator[Node]:
-    """The same of floor, mod and frac that conditions of a law read: a window in which it holds may be narrow."""
+    """Turns of floor, mod and frac that conditions of a law read: a window in which it holds may be narrow."""
     conditions = [node for node in topological_unbound([root]) if node.op == "cmp"]
     for node in topological_unbound(conditions):
         yield from _whole(node)

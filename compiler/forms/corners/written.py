@@ -54,6 +54,7 @@ def _iterations(kernel: Kernel, known: Values) -> Iterator[Iteration]:
 
 def _corners(kernel: Kernel, known: Values) -> set[Node]:
     """The switching functions of all elements at which a row of the first is not smooth."""
+    # all elements have one text: the first tells which operations are corners
     first = next(_iterations(kernel, known), None)
     if first is None:
         return set()
@@ -66,6 +67,7 @@ def _corners(kernel: Kernel, known: Values) -> set[Node]:
                 if here is not None and smoothness(root, here.u) < SMOOTH:
                     kept.add(node)
     found: set[Node] = set()
+    # those of every element
     for at in _iterations(kernel, known) if kept else ():
         for node in kept:
             here = watched_branches(substitute(node, at))
@@ -77,6 +79,7 @@ def _corners(kernel: Kernel, known: Values) -> set[Node]:
 
 
 def _block(block: Block, corners: set[Node], known: Values) -> Block:
+    """A block whose kernels with corners are written out element by element."""
     kernels: list[Kernel] = []
     for kernel in block.kernels:
         first = next(_iterations(kernel, known), None) if kernel.nest and any(map(_has_corner, kernel.rows)) else None

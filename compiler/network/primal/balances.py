@@ -143,11 +143,13 @@ def _split(
     like = components.likeness
     free = [(c, node) for c, node in held if id(node) not in merged]
     earth = next(((c, node) for c, node in held if node.node == ground(node.domain)), None)
+    # one node of the component is the reference: its balance is the sum of the others
     base = _reference(free, held, earth, merged)
     corner = _corner(base[0], like)
     gauge = None if earth is None or earth is base else earth[1].node
     rows: list[tuple[NodeCell, Box, str | None]] = []
     still: list[Effort] = []
+    # the reference has an effort of zero, merged nodes are read along their class, others have a row
     for cell, node in held:
         box = like.box(cell)
         if (cell, node) == base:

@@ -122,6 +122,7 @@ def box_difference(box: Box, *holes: Box) -> list[Box]:
 
 
 def _parts_outside(box: Box, hole: Box) -> Iterator[Box]:
+    """The parts of a box outside of a hole, a slab before and behind it along each dimension."""
     inner = tuple(a.common(b) for a, b in zip(box, hole, strict=True))
     if not box_size(inner):
         yield box
@@ -243,13 +244,18 @@ class Sizes:
         return tuple(self.index(node, within, place).over(within) for node in at)
 
     def _leaf(self, node: Node) -> float:
+        """Number of a parameter before the start: elements of the scene, formulas over indices, values of a list
+        (E807).
+        """
         if node.op != "param" or node.data not in self._parameters:
             raise ModelError([Diagnostic("E807", f"{to_text(node)} is not known before the start", None)])
         parameter = self._parameters[node.data]
         at = tuple(const(round(self.value(a))) for a in node.args)
+        # elements that a scene sets
         for setting in self._settings:
             if setting.name == node.data and self._same(setting.at, at):
                 return self.value(setting.value)
+        # a formula with loop variables
         if parameter.indices:
             change = {index(name): value for name, value in zip(parameter.indices, at, strict=False)}
             rest = len(parameter.indices)
@@ -312,6 +318,7 @@ def union(boxes: Sequence[Box]) -> list[Box]:
     changed = True
     while changed:
         changed = False
+        # again from the beginning after each join: boxes are few
         for i in range(len(kept)):
             for j in range(i + 1, len(kept)):
                 both = box_union(kept[i], kept[j])

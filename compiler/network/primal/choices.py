@@ -60,15 +60,19 @@ class Causality:
     def law(self) -> Law:
         """The branch's law."""
         branch = self.branch
+        # of statements, or of a coupling
         if branch.kind in ("field", "port"):
             return Law(branch.kind)
         if branch.law is None or branch.side is None:
             raise ModelError([Diagnostic("E409", f"branch {branch.name} has no law", branch.place)])
+        # a source of effort does work on its flow
         if branch.kind == "effort":
             return Law("work", branch.law)
+        # a source of flow is a constraint, of other unknowns a gamma
         if branch.kind == "flow":
             outer = [n for n in variables(branch.law) if n.op == "var" and n.data[1] != "s"]
             return Law("implicit" if outer else "row", sub(own(branch, "bf"), branch.law))
+        # given by the variable that Lagrange's form wants: as it is, unless it is solved for an implicit one
         if branch.side == OWN[branch.kind][1]:
             return self._inside_out(branch.law) or self._explicit(branch.law)
         return self._invert_law(branch.law)

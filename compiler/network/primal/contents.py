@@ -107,6 +107,7 @@ def at_stores(
 def _as_content(initial: Initial, said: Laws, reader: Rewriter) -> Iterator[Initial]:
     """Where a law tells it, what the store holds at the effort."""
     target = initial.target
+    # what is said of anything but an effort, by a number
     if target.op != "var" or target.data[1:] != ("be", 0) or variables(initial.value):
         yield initial
         return
@@ -116,12 +117,14 @@ def _as_content(initial: Initial, said: Laws, reader: Rewriter) -> Iterator[Init
         piece = reader.piece(target.data[0], target.args, ranges)
         branch = piece.element.branch
         found = None if branch in said.constant else held_at(branch, "be", mark)
+        # the law does not tell the content
         if found is None:
             return None, True
         value = substitute(reader.at_piece(found, piece, target.args), {mark: initial.value})
         return value, initial.fixed and branch in said.implicit
 
     for loops, (value, effort) in reader.cut(initial.loops, initial.place, content):
+        # the content, and the effort beside it where the law is implicit
         if value is not None:
             yield replace(initial, target=var(target.data[0], "bq", *target.args), value=value, loops=loops)
         if effort:
@@ -129,9 +132,11 @@ def _as_content(initial: Initial, said: Laws, reader: Rewriter) -> Iterator[Init
 
 
 def _at_store(initial: Initial, cells: Sequence[NodeCell], reader: Rewriter) -> Iterator[Initial]:
+    """Initial efforts of nodes as those of stores between the node and ground, element by element."""
     node = initial.target
 
     boxes: dict[Touch | None, list[Box]] = {}
+    # elements of the family by the store that each has
     for cell in cells:
         touch = next((t for t in cell.touches if _between_ground(t)), None)
         boxes.setdefault(touch, []).append(cell.box)
@@ -141,6 +146,7 @@ def _at_store(initial: Initial, cells: Sequence[NodeCell], reader: Rewriter) -> 
         return places[reader.locate(node.data[0], node.args, [box for box, _ in places], ranges)][1]
 
     for loops, touch in reader.cut(initial.loops, initial.place, store):
+        # no store to ground: the effort itself is said
         if touch is None:
             yield replace(initial, loops=loops)
             continue
@@ -183,6 +189,7 @@ class Contents:
         self.initials = initials
         joining = [(e, e.branch.kind, e.branch.domain.common) for e in elements if len(e.ends) == 2]
         # a branch of its own law may be a wire: an ideal diode, a switch
+        # stores and sources that may close a loop: their contents are not free
         series = [e for e, kind, common in joining if common == "effort" and kind in ("potential", "effort", "field")]
         between = [e for e, kind, common in joining if reflected and common == "flow" and kind == "potential"]
         both = [*series, *between]
@@ -198,6 +205,7 @@ class Contents:
         self._loose = any(  # what is said of others may ask for contents
             not _is_content(i) and not _of_momenta(i, kinetic) for i in initials
         )
+        # what is said of contents, by branch, with the elements it is said of
         for initial in filter(_is_content, initials):
             within = ranges_of(initial.loops, reader.sizes, initial.place)
             box = reader.sizes.reach(initial.target.args, within, initial.place)
@@ -205,6 +213,7 @@ class Contents:
         followers: dict[int, list[Member]] = {}
         begin = [m for m in members if m.element.branch.kind == "potential" or m.element.name in {*read, *self._given}]
         alike: dict[str, set[int]] = {}
+        # members of one coordinate: the first leads, others follow from it
         for m in begin:
             alike.setdefault(m.coordinate, set()).add(m.element.number)
         for m in begin:
@@ -212,6 +221,7 @@ class Contents:
                 followers.setdefault(m.element.number, []).append(m)
         for group in followers.values():
             self._follower(group[0].element, group)
+        # of the reflection, stores of a loop begin at what is said of them
         for e in between:
             if e.number in self.looped and e.branch.law is not None:
                 value = self.start(e.name, indices(e.named), ranges_over(e.named))
@@ -263,11 +273,14 @@ class Contents:
         """The initial conditions of coordinates and other unknowns; measured: stores whose guesses stand elsewhere."""
         known: set[tuple[Node, Node, tuple[Loop, ...], bool]] = set()
         for initial in (*self.initials, *self._follower_initials()):
+            # a guess of a store that is measured elsewhere
             if not initial.fixed and initial.target.op == "var" and initial.target.data[0] in measured:
                 continue
+            # of states and coordinates: as it stands
             if not touches_network(initial.target) and not touches_network(initial.value):
                 yield initial
                 continue
+            # of nodes and branches: piece by piece
             for loops, found in self.reader.cut(
                 initial.loops,
                 initial.place,

@@ -30,26 +30,31 @@ from sysdyn.dsl.text.diagnostics import Diagnostic, ModelError, Place
 
 
 def primal(network: Network, *, reflected: bool = False) -> tuple[Network, tuple[Diagnostic, ...], tuple[Step, ...]]:
-    """The same model in coordinates, notes about inverted laws, and what became of nodes and branches; ModelError where
-    that cannot be.  reflected: the network is the reflection of the author's.
+    """The network in coordinates, notes about inverted laws, and what became of nodes and branches; ModelError where
+    that cannot be. reflected: the network is the reflection of the author's.
     """
     if not network.branches and not network.nodes:
         return network, (), ()
     sizes = Sizes(network)
+    # which elements end where, and which flows are equal
     incidence = Incidence(network, sizes)
     classes = series(incidence, network.read)
+    # balances of effort nodes
     nodes = balances(incidence, classes.merged)
+    # each branch's law, solved for what the form wants
     said = laws(network, incidence.elements, sizes, reflected=reflected)
     potentials = Potentials(nodes.efforts)
     pieces = _pieces(incidence.elements, classes)
     book = EliminationTable(pieces, said.efforts, said.momenta, potentials.read, functions=said.functions)
     book.sticking = _sticking(network)
     reader = Rewriter(sizes, book)
+    # initial values at stores, the later statement before the earlier
     told = at_stores(network, said, incidence, reader, reflected=reflected)
     initials = foremost(tuple(told), network.branches, sizes)
     read = _charges(network)
     contents = Contents(reader, classes.members, initials, incidence.elements, reflected=reflected, read=read)
     guesses, stores = guess_contents(network, said.constant, initials, sizes, reader, reflected=reflected)
+    # the network in coordinates alone
     found = replace(
         network,
         parameters=(*network.parameters, *contents.parameters),

@@ -65,6 +65,7 @@ def _slopes(network: Network, name: str) -> tuple[list[_Slope], list[_Slope]]:
     """What makes the effort, and what makes the momentum, of the branches of a family."""
     efforts: list[_Slope] = []
     momenta: list[_Slope] = []
+    # e = dV/dq - dT*/dq + dD/df, p = dT*/df
     for energy in network.energies:
         sign = {"V": 1.0, "T": 1.0, "T*": -1.0}.get(energy.function)
         if sign is not None:
@@ -73,8 +74,10 @@ def _slopes(network: Network, name: str) -> tuple[list[_Slope], list[_Slope]]:
             efforts += _slopes_by(energy.expression, energy.loops, energy.place, (name, "bf"), const(1.0))
         if energy.function == "T*":
             momenta += _slopes_by(energy.expression, energy.loops, energy.place, (name, "bf"), const(1.0))
+    # minus what works supply
     for work in network.works:
         efforts += _slopes_by(work.on, work.loops, work.place, (name, "bq"), neg(work.effort))
+    # and reactions
     for c in network.constraints:
         if c.kind in ("phi", "psi"):
             multiplier = var(c.name, "kappa" if c.kind == "phi" else "mu", *c.at)

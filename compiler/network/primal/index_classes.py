@@ -115,6 +115,7 @@ class IndexClasses:
     # -- cells --------------------------------------------------------------------------------------------------
 
     def _cut(self, links: Sequence[Link], cuts: Iterable[Cut]) -> dict[Key, list[Interval]]:
+        """Intervals of each axis between all ends of items, links and cuts that are asked for."""
         found: dict[Key, dict[int, Bound]] = {}
 
         def add(axis: Key, first: Bound, behind: Bound) -> None:
@@ -223,9 +224,11 @@ class IndexClasses:
     def _unite(self, links: Sequence[Link]) -> None:
         """Equals first, one with many too, then runs inside cells, then what reaches from cell to cell."""
         applied = [(link, choice) for link in links for choice in self._choices(link)]
+        # whole cells that equal each other
         for link, choice in applied:
             if all(o.how in ("zero", "free") for o in choice):
                 self._join(*self._ends(link, choice), link.sign)
+        # runs: neighbours tied inside of one cell make it one class along the axis
         for link, choice in applied:
             a, b = self._ends(link, choice)
             for option in choice:
@@ -236,6 +239,7 @@ class IndexClasses:
                 elif option.how == "free" and option.axis is not None:
                     end = a if option.b < 0 else b
                     self._collapsed.add((self.find(end)[0], option.axis, max(option.a, option.b)))
+        # from cell to cell: only where both sides are collapsed already
         for link, choice in applied:
             a, b = self._ends(link, choice)
             crossing = [o for o in choice if o.how == "cross" and o.axis is not None]
@@ -263,17 +267,23 @@ class IndexClasses:
         return [(n, axis, own.plus(offset)) for n, own, (axis, offset) in found]
 
     def _options(self, link: Link, k: int) -> list[Option]:
+        """The intervals that a link meets along one dimension: tied by nothing, to one point, within one cell, or
+        across.
+        """
         places = [(n, axis, link.box[k].plus(moved)) for n, axis, moved in self._places(link, k)]
         if not places:
             return [Option("zero", -1, -1, None)]
+        # one end moves along the axis, the other stays
         if len(places) == 1:
             n, axis, stretch = places[0]
             inside = self._inside(axis, stretch)
             return [Option("free", i if n == 0 else -1, i if n == 1 else -1, axis) for i in inside]
         (_, axis, at_a), (_, _, at_b) = places
         shift = at_a.first.value - at_b.first.value
+        # both move together
         if shift == 0:
             return [Option("zero", i, i, axis) for i in self._inside(axis, at_a)]
+        # shifted by one: neighbours
         low, high = (at_b, at_a) if shift > 0 else (at_a, at_b)
         inside = self._inside(axis, Interval(low.first, high.last))
         found = [Option("self", i, i, axis) for i in inside if self._intervals[axis][i].size > 1]

@@ -35,6 +35,7 @@ def meeting(initial: Initial, at: Sequence[Node], within: Ranges, sizes: Sizes) 
     change: dict[Node, Node] = {}
     try:
         own = ranges_of(initial.loops, sizes, initial.place)
+        # index by index: both numbers or loop variables with a shift
         for said, asked in zip(initial.target.args, at, strict=True):
             a, b = sizes.affine(said, own, initial.place), sizes.affine(asked, within, initial.place)
             reach = Interval(a.offset, a.offset) if a.loop is None else own[a.loop].plus(a.offset)
@@ -42,10 +43,12 @@ def meeting(initial: Initial, at: Sequence[Node], within: Ranges, sizes: Sizes) 
                 if index(a.loop) in change:
                     return None
                 change[index(a.loop)] = sub(asked, a.offset.node)
+            # a number must lie in the statement's range
             if b.loop is None:
                 if not reach.holds(Interval(b.offset, b.offset)):
                     return None
                 continue
+            # ranges must meet
             shared = found[b.loop].common(reach.minus(b.offset))
             if not shared.size:
                 return None

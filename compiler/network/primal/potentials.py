@@ -73,6 +73,7 @@ class Potentials:
         return add(best.base, *best.terms)
 
     def _path(self, reader: Rewriter, effort: Effort, at: tuple[Node, ...], touch: Touch, ranges: Ranges) -> _Path:
+        """The way from a node to one whose effort is known: terms along merged elements, periods of a run summed up."""
         terms: list[Node] = []
         visits: list[_Visit] = []
         kinetic = 0
@@ -86,6 +87,7 @@ class Potentials:
             if effort.how == WALK:
                 touch = _other(effort, arrival)
                 back = next((v for v in visits if v.effort == effort and v.touch == touch), None)
+                # the same cell and element as before: a period
                 if back is not None:
                     terms, at, effort, name = self._run(reader, visits, back, (effort, at), terms, ranges)
                     visits = []
@@ -106,6 +108,7 @@ class Potentials:
         before, behind = reader.affine(start.at, ranges), reader.affine(now[1], ranges)
         shifts = [b.offset.value - a.offset.value for a, b in zip(before, behind, strict=True)]
         along = [d for d, s in enumerate(shifts) if s]
+        # a period that does not move on by one index has no sum over a loop
         if len(along) != 1 or abs(shifts[along[0]]) != 1:
             place = reader.place or start.effort.cell.place
             raise unrolling_error(f"the effort of node {start.effort.node} along its series class", place)
@@ -118,12 +121,14 @@ class Potentials:
         period: list[Node] = []
         limits: list[Bound] = []
         effort, touch = start.effort, start.touch
+        # one period at a counter, and how far each of its cells reaches
         for _ in visits[visits.index(start) :]:
             limits += _limits(effort, reader.affine(at, own), counter, step)
             term, name, at = _step(touch, at)
             period.append(term)
             effort = self.effort_of_node(reader, name, at, own)
             touch = _other(effort, touch) if effort.how == WALK else touch
+        # up to where the first of them ends
         end = (max if step < 0 else min)(limits, key=lambda b: b.value)
         first, last = (end.node, start.at[d]) if step < 0 else (start.at[d], end.node)
         total = reduction("sum", counter, first, last, add(*period))

@@ -44,7 +44,7 @@ def foremost(initials: Sequence[Initial], branches: Sequence[Branch], sizes: Siz
     kept: list[Initial] = []
     for k, initial in enumerate(initials):
         book = books[_key(initial, kinds)] if _of_an_unknown(initial) else None
-        kept += [initial] if book is None else _uncovered(initial, book.before((k, initial)), sizes)
+        kept += [initial] if book is None else _remaining_parts(initial, book.before((k, initial)), sizes)
     return tuple(kept)
 
 
@@ -89,7 +89,7 @@ def _rank(k: int, initial: Initial) -> tuple[int, bool, int]:
     return initial.depth, not initial.fixed, -k
 
 
-def _uncovered(initial: Initial, others: Sequence[Initial], sizes: Sizes) -> Iterator[Initial]:
+def _remaining_parts(initial: Initial, others: Sequence[Initial], sizes: Sizes) -> Iterator[Initial]:
     """What no statement that goes before is about."""
     within = ranges_of(initial.loops, sizes, initial.place)
     for rest in untold(others, initial.target.args, within, sizes):

@@ -171,6 +171,7 @@ class Rewriter:
         return done[root]
 
     def _rewrite_reduction(self, node: Node, ends: tuple[Node, Node], ranges: Ranges, active: tuple[Node, ...]) -> Node:
+        """A reduction whose body reads the network: rewritten, cut in two where its range runs over several boxes."""
         operator, name = node.data
         body = node.args[2]
         if not touches_network(body):
@@ -189,20 +190,27 @@ class Rewriter:
         return combine_terms(operator, parts)
 
     def _read(self, node: Node, ranges: Ranges, active: tuple[Node, ...]) -> Node:
+        """What a variable of nodes and branches is in coordinates; E105 of a circle, E102 of a quantity that is not
+        there.
+        """
         if node in active:
             text = f"{node.data[0]} is defined in a circle: {to_text(node)}"
             raise ModelError([Diagnostic("E105", text, self.place)])
         name, kind, order = node.data
         inside = (*active, node)
+        # a node that is a coordinate
         if kind in ("nq", "nf", "np"):
             return var(name, kind[1], *node.args, order=order)
         if kind in CLASSES:
             return var(name, f"x{kind[1:]}", *node.args)
+        # derivatives of what the variable itself is
         if order:
             plain = self.resolve(var(name, kind, *node.args), ranges, active)
             return self._derivative(plain, node)
+        # by potentials
         if kind == "ne":
             return self.book.nodes(self, node, ranges, inside)
+        # of a branch: by the element that holds the reference
         piece = self.piece(name, node.args, ranges)
         if kind in ("bq", "bf"):
             return self._moving(node, piece, ranges, inside)
@@ -215,6 +223,7 @@ class Rewriter:
             held = self.book.sticking.get(name, ()) if kind == "be" else ()
             return add(found, *(var(label, "mu", *node.args) for label in held)) if held else found
         plain_ends = piece.element.ends
+        # between effort nodes: the difference of potentials
         if kind == "be" and len(plain_ends) == 2 and piece.element.branch.domain.common == "effort":
             plus, minus = (self._end(c, "ne", piece, node.args) for c in plain_ends)
             return self.resolve(sub(plus, minus), ranges, inside)
@@ -260,6 +269,7 @@ class Rewriter:
         return substitute(self._rename_loops(root), change)
 
     def _rename_loops(self, root: Node) -> Node:
+        """An expression whose reductions have loop variables of their own, so that it can be put into others."""
         done: dict[Node, Node] = {}
         nodes = topological([root])
         if all(node.op != "reduce" for node in nodes):
@@ -290,10 +300,12 @@ class Rewriter:
         places = self.affine(at, ranges)
         held = {loop: r.interval for loop, r in ranges.items()}
         reach = tuple(a.over(held) for a in places)
+        # one box holds all of it
         for k, box in enumerate(boxes):
             if len(box) == len(reach) and box_holds(box, reach):
                 return k
         corner = tuple(Interval(i.first, i.first) for i in reach)
+        # it begins in one: cut where that ends
         for box in boxes:
             if len(box) == len(corner) and box_holds(box, corner):
                 k = next(k for k, (b, r) in enumerate(zip(box, reach, strict=True)) if not b.holds(r))

@@ -131,6 +131,7 @@ class _Class:
 
 
 def _classes(flowing: Sequence[Element], likeness: IndexClasses) -> tuple[tuple[Coordinate, ...], tuple[Member, ...]]:
+    """Coordinates of the classes of equal flows, and the members of each class with sign and indices."""
     classes = sorted((_class(m, flowing, likeness) for m in likeness.groups().values()), key=lambda c: c.leader)
     named = [_family(c, flowing, likeness) for c in classes]
     plain = [(name, box) for name, box, whole in named if whole]
@@ -138,6 +139,7 @@ def _classes(flowing: Sequence[Element], likeness: IndexClasses) -> tuple[tuple[
     taken = {p.name for p in parts(plain)}
     coordinates: dict[str, Coordinate] = {}
     members: list[Member] = []
+    # a class over a whole family keeps its name and range
     for c, (name, box, whole) in zip(classes, named, strict=True):
         if whole:
             part = next(names)
@@ -190,6 +192,7 @@ def _coordinate(name: str, shape: Shape, leader: Element) -> Coordinate:
 
 
 def _members(c: _Class, name: str, flowing: Sequence[Element], likeness: IndexClasses) -> Iterable[Member]:
+    """Elements of a class by the leader's indices; those along which all are tied have one value."""
     leader = flowing[c.leader[0]]
     first = likeness.box(c.leader)
     for cell, sign in c.members:
@@ -197,11 +200,13 @@ def _members(c: _Class, name: str, flowing: Sequence[Element], likeness: IndexCl
         own = {likeness.axis(cell[0], d)[0]: d for d in range(len(element.loops))}
         at: list[tuple[int | None, Bound]] = []
         for k, place in enumerate(leader.at):
+            # a fixed index
             if place.loop is None:
                 at.append((None, place.offset))
                 continue
             d = leader.loops.index(place.loop)
             axis, offset = likeness.axis(c.leader[0], d)
+            # the index moves along, but for a shift
             if k in c.kept and axis in own and cell[1][own[axis]] == c.leader[1][d]:
                 mine = likeness.axis(cell[0], own[axis])[1]
                 at.append((element.place_of(element.loops[own[axis]]), mine.minus(offset)))

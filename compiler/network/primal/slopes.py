@@ -94,13 +94,16 @@ def check_slopes(network: Network, parameters: Parameters) -> None:
         if wrong.any():
             name, text = slope.name.partition("#")[0], to_text(slope.expression)
             help_ = "a formulation in which the law is explicit"
+            # left out because it was zero
             if slope.flat:
                 message = f"the law of {name} was compiled for {text} = 0, which is now {values[wrong.argmax()]:g}"
                 help_ = "compile the model with that value"
+            # a root was chosen by the sign
             elif slope.sign:
                 told = f"{text} {'>' if slope.sign > 0 else '<'} 0"
                 message = f"the law of {name} was compiled for {told}, which is now {values[wrong.argmax()]:g}"
                 help_ = "compile the model with that value"
+            # divided by
             else:
                 some = "" if wrong.all() else " in some of its elements"
                 message = f"the law of {name} cannot be inverted: {text} is zero{some}"

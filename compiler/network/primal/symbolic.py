@@ -48,16 +48,19 @@ class Algebra:
         """The roots of an equation with one square root, squared."""
         sympy, v = self._sympy, self._v
         powers = [p for p in equation.atoms(sympy.Pow) if p.exp.is_Rational and p.exp.q == 2 and p.has(v)]
+        # one square root at most
         if len({p.base for p in powers}) > 1:
             return
         r = sympy.Symbol("r", positive=True)
         whole = sympy.numer(sympy.together(equation.xreplace({p: r ** (2 * p.exp) for p in powers})))
+        # r^2 = base: the resultant has no root
         if powers:
             under = sympy.numer(sympy.together(r**2 - powers[0].base))
             whole = sympy.resultant(sympy.expand(whole), sympy.expand(under), r)
         found = sympy.Poly(sympy.expand(whole), v)
         degree, even = found.degree(), all(k % 2 == 0 for (k,) in found.monoms())
         coefficients = [sympy.factor(found.coeff_monomial(v**k)) for k in range(5)]
+        # a polynomial in v^2
         if degree in (2, 4) and even:
             for square in self._quadratic(*coefficients[0:5:2]):
                 yield from (sympy.sqrt(sympy.factor(square)), -sympy.sqrt(sympy.factor(square)))
@@ -79,6 +82,7 @@ class Algebra:
             if node in done:
                 continue
             args = [done[a] for a in node.args]
+            # exactly: doubles are fractions
             if node.op == "const":
                 done[node] = sympy.Rational(node.data)
             elif node.op == "sum":
@@ -99,6 +103,7 @@ class Algebra:
         return done[root]
 
     def _one(self, part: Any, args: list[Node]) -> Node | None:
+        """Node of a sympy object from those of its arguments; None where the language does not have it."""
         if part in self._nodes:
             return self._nodes[part]
         if part.is_Rational:

@@ -41,16 +41,19 @@ def guess_contents(
     known = {initial.store for initial in initials}
     lengths = [b for b in network.branches if b.kind == "potential" and b.domain.common == "flow" and not reflected]
     positions = set[Branch]() if _lengths_guessed(lengths, initials) else set(lengths)
+    # stores whose contents follow from coordinates
     for b in network.branches:
         if b.kind not in TELLING or b in constant or b in positions:
             continue
         unit = b.domain.displacement if b.kind == "potential" else b.domain.effort
         for loops, content, read in _contents(b, b.loops, reader):
+            # by several coordinates: none of them is measured alone
             if len(read) > 1 or (
                 b.kind == "kinetic" and any(line(content, n) is None for n in read & _unknowns(content))
             ):
                 shared |= _owners(read)
                 continue
+            # two stores measured by one coordinate share it
             for node in read:
                 others = held.setdefault((node.data[0], node.data[1]), [])
                 box = sizes.reach(node.args, ranges_of(loops, sizes, b.place), b.place)
@@ -62,6 +65,7 @@ def guess_contents(
                 found.append((guess, _owners(moving)))
     written, names = _written(network.energies), set[str]()
     shared -= written
+    # what shares a coordinate with a shared one is shared
     while more := {initial.store for initial, owners in found if owners & shared} - names:
         names |= more
         shared |= {owner for initial, owners in found if initial.store in more for owner in owners} - written

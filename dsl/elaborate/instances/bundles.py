@@ -51,14 +51,17 @@ class Bundles:
         return self._read[item]
 
     def _members(self, item: syntax.Bundle) -> Iterator[tuple[syntax.Word, DomainSymbol | BundleSymbol | None]]:
+        """Words of a bundle's members with their kinds: a domain, another bundle, None where that could not be read."""
         before: dict[str, syntax.Word] = {}
         for member in item.members:
+            # a member that could not be read leaves the bundle incomplete: the caller learns it by a None
             if isinstance(member, syntax.Broken):
                 yield item.name, None
                 continue
             kind = self._kind(member.domain)
             for word in member.names:
                 first = before.setdefault(word.name, word)
+                # `a: electrical, a: rotation`: reported once; the first one counts
                 if first is not word:
                     related = (Related("first declared here", Place(self._source, first.span)),)
                     message = f"'{word.name}' is declared twice"

@@ -171,10 +171,13 @@ class Moulds:
         """Cast an instance where it stands, if there is a mould and nothing can be wrong with it."""
         here, given = it.current, {a.name or "": a.value for a in s.args or ()}
         mould = self._moulds.get(self._key(s, body, here.scope))
+        # no mould of this shape; an array; loops around; coordinates, which a cast cannot read
         if mould is None or symbol.spaces or here.prefix or not it.resolver.free or it.parts.coordinates:
             return False
+        # casts have one branch, and none contains itself
         if len(s.connections) != 1 or component.name in (*here.chain, here.component):
             return False
+        # each argument is a quantity in a unit that fitted before: nothing can be wrong with it
         for name, value in given.items():
             if not isinstance(value, syntax.Quantity) or (name, value.unit.text) not in mould.fitting:
                 return False
@@ -185,6 +188,7 @@ class Moulds:
         values = {name: it.resolver.scalar(value).node for name, value in given.items()}
         path = f"{here.path}.{s.decl.name}" if here.path else s.decl.name
         space = Likeness(here, component, path, it.place(s.decl.span), mould, ends)
+        # the value that the instance gives, or the formula of the component in its names
         for held in mould.parameters:
             name = f"{path}.{held.name}"
             node = values[held.name] if held.value is None else held.value.under(path)
@@ -273,8 +277,10 @@ def _plain(body: Body) -> bool:
 
 def _between(scope: Scope, connection: syntax.Connection, domain: DomainSymbol) -> Ends | None:
     """The ends of a branch between two nodes of a domain that stand alone, or one and ground; None: anything else."""
+    # `a -> b`
     if isinstance(connection, syntax.Across):
         said: Sequence[syntax.Expr | None] = (connection.plus, connection.minus)
+    # `a`: to ground
     elif isinstance(connection, syntax.Single):
         said = (connection.node, None)
     else:
@@ -284,6 +290,7 @@ def _between(scope: Scope, connection: syntax.Connection, domain: DomainSymbol) 
         if e is None or (isinstance(e, syntax.Name) and e.name == "ground"):
             found.append(End(None, (), domain))
             continue
+        # nodes of arrays, of other domains and undeclared ones go the long way, which reports what is wrong
         node = scope.find(e.name) if isinstance(e, syntax.Name) else None
         if not isinstance(node, NodeSymbol) or node.domain is not domain or node.family.shape or node.family.prefix:
             return None

@@ -40,6 +40,7 @@ def conjugate_of(parts: NetworkBuilder, space: Space, end: End, *, rates: bool =
     name, held = end.node.family.name, "e" if end.domain.common == "flow" else "f"
     around = len(space.loops)
     terms = []
+    # branches inside that end at the port: what they carry, in at their plus and out at their minus end
     for branch in parts.branches:
         if not _inside(branch.name, branch.loops, space):
             continue
@@ -49,6 +50,7 @@ def conjugate_of(parts: NetworkBuilder, space: Space, end: End, *, rates: bool =
                 terms.append(sum_over_loops(_where(terminal.at, end.at, own), branch.loops[around:]))
     said = [s for owner, all_ in parts.owned.items() for s in all_ if _inside(owner, s.loops, space)]
     along = [b for b in parts.branches if b.on is not None and _inside(b.name, b.loops, space)]
+    # an array of ports: no statement inside may read it, for which element it reads is not told apart
     if end.node.family.shape and space.scope.symbols.get(end.node.name) is end.node:  # a port that is an array
         for s in said:
             if any(name == n.data[0] for root in _roots(s) for n in ex.variables(root) if n.op == "var"):
@@ -57,12 +59,14 @@ def conjugate_of(parts: NetworkBuilder, space: Space, end: End, *, rates: bool =
             if any(name == n.data[0] for n in ex.variables(b.on or ex.const(0.0)) if n.op == "var"):
                 raise NotSaidError("acts on this array of ports", b.place)
         return ex.add(*terms)
+    # an electrical node: branches alone carry its flow
     if end.domain.common == "effort":
         effort = ex.var(name, "ne", *end.at)
         for s in said:
             if any(effort in ex.variables(root) for root in _roots(s)):
                 raise NotSaidError("acts on its effort", s.place)
         return ex.add(*terms)
+    # a common-flow node: energies, works and constraints inside act on it too
     coordinate = end.node.coordinate
     if coordinate is not None and coordinate.complementary:
         raise NotSaidError("acts on a momentum coordinate", end.node.place)
@@ -72,6 +76,7 @@ def conjugate_of(parts: NetworkBuilder, space: Space, end: End, *, rates: bool =
         for b in along
         if b.on
     ]
+    # constraints of switches may give impulses, which no effort at an instant tells
     jumps = {draft.label: draft.place for draft in parts.drafts if draft.kind in ("phi", "psi", "guarded")}
     for s in said:
         if any({q, f, p} & ex.variables(root) for root in _roots(s)):
@@ -105,8 +110,10 @@ def _effort_of_statement(
     s: Energy | Work | Constraint, q: Node, f: Node, jumps: dict[str, Place], *, rates: bool
 ) -> Node:
     """The effort that a statement asks of the node: it is taken from where it acts."""
+    # delta W = F delta x delivers F
     if isinstance(s, Work):
         return ex.neg(ex.mul(s.effort, derivative(s.on, q)))
+    # a reaction: multiplier times the gradient; a gamma does no work
     if isinstance(s, Constraint):
         if s.name in jumps:
             raise NotSaidError("may give it impulses", s.place)
@@ -116,8 +123,10 @@ def _effort_of_statement(
         return ex.neg(reaction(s.expression, s.kind == "phi", q, multiplier))
     if s.function.startswith("kept"):  # for the audit alone
         return ex.const(0.0)
+    # a spring: dV/dq
     if s.function == "V" and f not in ex.variables(s.expression):
         return derivative(s.expression, q)
+    # a damper: dD/df
     if s.function == "D":
         return derivative(s.expression, f)
     if s.function == "T*" and rates:  # Lagrange's equation: what gives its momentum a rate

@@ -58,21 +58,27 @@ class Ports(Inputs):
         s, head = asked.s, asked.head
         for connection in s.connections:
             match connection:
+                # `a = n1`
                 case syntax.Bind():
                     self._bind(asked, connection)
+                # `winding = n1 -> n2`
                 case syntax.BindAcross():
                     self._bind_branch(asked, connection.name.name, connection)
+                # `n1` alone, and one port that it can mean
                 case syntax.Single() if len(head.branches) != 1 and len(head.ports) == 1:
                     self._bind_port(asked, next(iter(head.ports)), connection.node)
+                # `n1 -> n2`: the one branch of the component
                 case _:
                     if len(head.branches) != 1:
                         raise self._by_name(asked, connection)
                     self._bind_branch(asked, next(iter(head.branches)), connection)
+        # each port and branch needs a connection
         for name in (*head.ports, *head.branches):
             if name not in asked.bound:
                 what = f"port '{name}'" if name in head.ports else f"branch '{name}'" if name else "the branch"
                 help_ = f"{name} = NODE, or {name} = ground" if name else "a -> b"
                 raise self.resolver.fail("E408", f"{what} of '{s.decl.name}' is not connected", s.span, help=help_)
+        # inputs without a default need a value
         for name, statement in head.inputs.items():
             if name not in asked.inputs and statement.value is None:
                 raise self.resolver.fail(
@@ -214,6 +220,7 @@ class Ports(Inputs):
     def _bind_branch(self, asked: Asked, name: str, connection: syntax.Connection) -> None:
         """A branch between two ends, or along an expression."""
         s, head, space = asked.s, asked.head, asked.space
+        # a name that the component does not have, or that is a port of one node
         if name not in head.branches:
             others = [other for other in (*head.branches, *head.ports) if other]
             near = nearest(name, others)
@@ -223,6 +230,7 @@ class Ports(Inputs):
             raise self.resolver.fail(
                 "E407", f"'{asked.component.name}' has no branch '{name}'", connection.span, help=said
             )
+        # two connections for one branch, as `R: resistor(...) a b` in place of `a -> b`
         if name in asked.bound:
             message = f"'{s.decl.name}: {asked.component.name}' needs 1 connection, has {len(s.connections)}"
             nodes = [self._text(c.node) for c in s.connections if isinstance(c, syntax.Single)]
@@ -233,6 +241,7 @@ class Ports(Inputs):
         if not isinstance(wanted, DomainSymbol):
             self.report.error("E202", f"'{word.name}' is not a domain", Place(space.source, word.span))
             raise Failed
+        # the ends, which have to be of the branch's domain
         ends = self._ends(s, connection, wanted)
         if ends.domain is not None and ends.on is None and ends.domain.name != wanted.name:
             end = next(e for e in (ends.plus, ends.minus) if e is not None and e.node is not None)
@@ -243,6 +252,7 @@ class Ports(Inputs):
         symbol = BranchSymbol(name or s.decl.name, family, wanted, self.place(s.decl.span))
         space.scope.symbols[name] = symbol
         space.ends[name] = ends
+        # the component's own branch: its laws may read e, f, q, p without a name
         if not name:
             space.bound.update(own_variables(symbol, space.prefix))
         asked.bound.add(name)

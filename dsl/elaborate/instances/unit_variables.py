@@ -38,14 +38,17 @@ def solve_units(
     if not names:
         return
     equations, places = [], dict[str, Place | syntax.Span]()
+    # each argument in a unit with variables is an equation: k: $u/m given 3 N/m says $u = N
     for name, unit in declared.items():
         if not any(f.name.startswith("$") for f in unit.factors):
             continue
         if name in arguments:
             value = arguments[name].value
             given, places[name] = value.dimension if isinstance(value, Typed) else None, arguments[name].place
+        # of an input its expression tells the dimension
         elif name in inputs:
             given, places[name] = frame.resolver.scalar(inputs[name]).dimension, inputs[name].span
+        # defaulted: says nothing of the variables
         else:
             continue
         if given is not None:
@@ -78,11 +81,13 @@ def _solve_units(
 ) -> dict[str, Dimension]:
     """What the variables are; E209 where equations do not tell, or contradict each other."""
     found = _eliminate(names, equations)
+    # no argument has the variable in its unit
     if isinstance(found, str):
         message = f"unit variable {found} of '{s.decl.name}' is not determined"
         raise frame.resolver.fail("E209", message, s.span, help="give an input or parameter that has it")
     if isinstance(found, dict):
         return found
+    # a contradiction: leaving out one argument in turn shows whether it alone is odd
     odd = {
         e[2]: rest
         for e in equations
@@ -109,6 +114,7 @@ def _eliminate(
     rows = [(dict(e), d, n) for e, d, n in equations]
     solved: list[tuple[str, dict[str, Fraction], Dimension]] = []
     told: dict[str, Equation] = {}
+    # forward: one equation tells the variable, the others lose it
     for variable in sorted(names):
         pivot = next((r for r in rows if r[0].get(variable)), None)
         if pivot is None:
@@ -120,10 +126,12 @@ def _eliminate(
         value = power_of(pivot[1], 1 / factor)
         solved.append((variable, exponents, value))
         rows = [_substitute(r, variable, exponents, value) for r in rows]
+    # an equation without variables that is not 1 = 1
     wrong = next((r for r in rows if r[1]), None)
     if wrong is not None:
         return wrong, told
     found: dict[str, Dimension] = {}
+    # back substitution
     for variable, exponents, value in reversed(solved):
         for other, power in exponents.items():
             value = multiply(value, found[other], -power)

@@ -131,13 +131,16 @@ class SceneReader:
         return node
 
     def _time(self, s: syntax.Time) -> None:
+        """Read `time START to STOP`: both finite instants [s], the end after the start (E912)."""
         start = self._constant(s.start, dim.TIME, f"the start '{self._text(s.start)}'")
         end = self._constant(s.stop, dim.TIME, f"the end '{self._text(s.stop)}'")
         self._once("start", start, s.span, "time")
+        # `time 0 s to inf`
         for node, text in ((start, self._text(s.start)), (end, self._text(s.stop))):
             if node.op == "const" and not math.isfinite(node.data):
                 message = f"'{text}' is no instant: a run begins and ends"
                 raise self.resolver.fail("E912", message, s.span, help="time 0 s to 10 s")
+        # an order that can be told now: parameters have no values yet
         if start.op == end.op == "const" and end.data < start.data:
             message = f"the time ends before it starts: {self._text(s.start)} to {self._text(s.stop)}"
             help_ = f"time {self._text(s.stop)} to {self._text(s.start)}"
@@ -175,6 +178,7 @@ class SceneReader:
         self._choice(s.name, SOLVERS, "solver")
         self._once("solver", s.name.name, s.span)
         options: list[tuple[str, Node]] = []
+        # `solver bdf(step = 1 ms, index = 2)`
         for arg in s.args or ():
             if arg.name is None or arg.name not in _SOLVER_OPTIONS:
                 message = f"the solver has no option '{arg.name or format_expression(arg.value)}'"
@@ -183,11 +187,13 @@ class SceneReader:
                 )
             if arg.name in dict(options):
                 raise self.resolver.fail("E106", f"'{arg.name}' of the solver is given twice", arg.span)
+            # 2v is no number: the stabilised index 2 with projected velocities
             if isinstance(arg.value, syntax.Name) and arg.value.name[0].isdigit():
                 if (arg.name, arg.value.name) != ("index", "2v"):
                     message = f"{arg.name} = {arg.value.name} of the solver"
                     raise self.resolver.fail("E607", message, arg.value.span, help="index = 0, 1, 2, 2v, 3")
                 node, self._found["velocities"] = ex.const(2.0), True
+            # options that are true or false
             elif arg.name in ("keep_implicit", "keep_flow"):
                 node = self._yes(arg.value, arg.name)
             else:
@@ -252,15 +258,18 @@ class SceneReader:
             )
         name = item.alias.name if item.alias else trace_name(format_expression(item.expr))
         where = item.alias.span if item.alias else item.span
+        # `trace x as time`
         if name in RESERVED:
             raise self.resolver.fail(
                 "E911", f"trace name '{name}' belongs to the trace itself", where, help="another name with 'as'"
             )
         if any(o.name == name for o in self.observations):
             raise self.resolver.fail("E106", f"'{name}' is traced twice", where, help="another name with 'as'")
+        # a condition is traced as 1 and 0
         node = ex.conditional(value.node, ex.const(1.0), ex.const(0.0)) if value.truth else value.node
         unit = self._traced_unit(item, value)
         scaled = node
+        # `in degC`, `in mm`: the trace holds the numbers of that unit
         if unit.scale != 1 or unit.offset:
             scaled = ex.scale(float(1 / unit.scale), ex.sub(node, ex.const(float(unit.offset))))
         self._raw.setdefault(node, name)
@@ -287,11 +296,13 @@ class SceneReader:
     def _accuracy(self, s: syntax.Accuracy) -> None:
         """What a run promises, and of which quantities."""
         value = self._constant(s.value, NONE, "the accuracy")
+        # for all that is traced
         if not s.on:
             self._once("accuracy", value, s.span, help="accuracy 1e-6 on x: another for what is named")
         if value.op == "const" and not FINEST_ACCURACY <= value.data < 1.0:
             text = f"accuracy {value.data:g}: from {FINEST_ACCURACY:g} to less than 1, what doubles can tell"
             raise self.resolver.fail("E906", text, s.value.span, help="accuracy 1e-6")
+        # for what is named: by its name in the trace, or by the expression that is traced
         names: list[str] = []
         for target in (element for written in s.on for element, _ in each_of(self.model, written)):
             if (named := self._traced_as(target)) is not None:
@@ -302,9 +313,11 @@ class SceneReader:
                     node = self.resolver.scalar(target).node
             except Failed:
                 continue  # it has been said
+            # `audit.energy` needs no trace item
             if node not in self._raw and node.op == "var" and node.data[1] == "audit":
                 names.append(f"audit.{node.data[0]}")  # in every trace
                 continue
+            # a trace item failed: perhaps the one that is meant
             if node not in self._raw and self._lost:
                 raise Failed  # it may stand there
             if node not in self._raw:

@@ -28,6 +28,7 @@ def watch_tables(elaborator: Elaborator, observations: Iterable[Observation]) ->
     tables, parts = elaborator.files.tables, elaborator.parts
     if all(t.outside != "stop" for t in tables.values()):
         return
+    # what is read of tables outside of the equations: a step does not see where their arguments leave the range
     moving = [e for e in parts.expectations if e.moment != "static"]
     asked = [(o.expression, o.place) for o in (*observations, *parts.watched)]
     asked += [(node, e.place) for e in moving for node in (e.left, e.right)]
@@ -37,6 +38,7 @@ def watch_tables(elaborator: Elaborator, observations: Iterable[Observation]) ->
         for node in ex.topological([root]):
             table = tables.get(node.data[0]) if node.op == "table" and node not in met else None
             met.add(node)
+            # each argument of a stopping table that moves gets a state whose rate is a table of the same range
             for k, argument in enumerate(node.args if table is not None and table.outside == "stop" else ()):
                 if table is None or not _a_rate(argument):
                     continue

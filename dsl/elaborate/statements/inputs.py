@@ -103,13 +103,16 @@ class Inputs(Elements):
         stack: list[syntax.Expr] = [expression]
         while stack:
             for node in walk(stack.pop()):
+                # what is read by a prime or a dot moves, or is not known yet
                 if isinstance(node, (syntax.Prime, syntax.Member, syntax.Reduction)):
                     return False
                 if isinstance(node, syntax.Name) and node.name not in seen:
                     seen.add(node.name)
                     symbol = self.scope.find(node.name)
+                    # `pi` and `inf` of the language
                     if symbol is None and node.name in ("pi", "inf"):
                         continue
+                    # a constant is as constant as its own expression
                     if isinstance(symbol, Definition) and symbol.kind == "const":
                         stack.append(symbol.expression)
                     elif not isinstance(symbol, ParameterSymbol):

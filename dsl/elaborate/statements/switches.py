@@ -54,10 +54,12 @@ def _switch(frame: ElaborationContext, draft: Draft, change: dict[Node, Node], k
     def seen(node: Node | None) -> str | None:
         return None if node is None else watch(frame, in_element(node), NONE, draft.place)
 
+    # what is compared while it sticks
     bound, upper, lower = (seen(n) for n in _bounds(draft))
     at = tuple(int(known.number(in_element(n))) for n in draft.at)
     name = f"{draft.label}[{', '.join(map(str, at))}]" if at else draft.label
     guard = None if draft.guard is None else ex.conditional(draft.guard, ex.const(1.0), ex.const(0.0))
+    # the law's own variable, its rate and, of a phi, its acceleration, by which contacts open and close
     value = watch(frame, in_element(draft.value), draft.unit.dimension, draft.place)
     rate = watch(frame, in_element(draft.rate or time_derivative(draft.value)), NONE, draft.place)
     multiplier = watch(frame, in_element(draft.multiplier), NONE, draft.place)
