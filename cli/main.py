@@ -182,9 +182,11 @@ def _ended_like_an_interruption(last: bool) -> Iterator[None]:
     Those that somebody ignores (nohup) or handles already stay so.  last: nothing follows in this process but its exit,
     which a signal that comes late does not change.
     """
+    # signals can be set in the main thread alone
     mine = threading.current_thread() is threading.main_thread()
     names = ("SIGINT", "SIGTERM", "SIGHUP") if mine else ()  # Windows has no SIGHUP
     known = {number: signal.getsignal(number) for name in names if (number := getattr(signal, name, None)) is not None}
+    # handlers that nobody changed
     own = {
         s: h for s, h in known.items() if h is (signal.default_int_handler if s == signal.SIGINT else signal.SIG_DFL)
     }
@@ -214,5 +216,6 @@ def _ended_like_an_interruption(last: bool) -> Iterator[None]:
         yield
     finally:
         sys.unraisablehook = before
+        # as before, or nothing more where the process ends
         for number, handler in own.items():
             signal.signal(number, signal.SIG_IGN if last else handler)

@@ -94,14 +94,17 @@ class Writer(ABC):
         return " ".join(found) or "0"
 
     def _sign_and_text(self, term: Summed) -> tuple[int, str]:
+        """Sign and text of a term with its sums, so that a minus stands between terms and not inside of them."""
         sign, node = 1, term.expression
         text, strength = self.piece(node)
+        # -2 x: the sign in front
         if node.op == "sum" and node.data[0] == 0.0 and len(node.args) == 1 and node.data[1][0] < 0.0:
             sign = -1
             text = text.removeprefix(self.minus)
             strength = PRODUCT
         elif node.op == "const" and node.data < 0:
             sign, text = -1, text.removeprefix(self.minus)
+        # a sum under a summation sign
         if term.over and strength < PRODUCT:
             text = self.parenthesize(text)
         for loop in reversed(term.over):
@@ -128,6 +131,7 @@ class Writer(ABC):
         return f"{sign}{size:.12g}", SUM if sign else ATOM
 
     def _node(self, node: Node, args: list[Piece]) -> Piece:
+        """Text of a node with its strength, from those of its arguments."""
         texts = [text for text, _ in args]
         match node.op:
             case "const":
@@ -150,7 +154,9 @@ class Writer(ABC):
                 return self._call(node, args)
 
     def _sum(self, node: Node, args: list[Piece]) -> Piece:
+        """Text of a sum, positive terms first, then in the order of a book."""
         constant, coefficients = node.data
+        # a multiple
         if constant == 0.0 and len(args) == 1:
             return self._times(coefficients[0], node.args[0], args[0])
         parts = sorted(zip(coefficients, node.args, args, strict=True), key=lambda p: (p[0] < 0, self._rank(p[1])))
@@ -176,6 +182,7 @@ class Writer(ABC):
         return f"{sign}{text}", SUM if sign else strength
 
     def _product(self, factor: float, node: Node, args: list[Piece]) -> Piece:
+        """Text of a product, above and below the bar; square roots as roots."""
         above: list[str] = []
         below: list[str] = []
         pairs = sorted(zip(node.args, node.data, args, strict=True), key=lambda p: self._rank(p[0]))
@@ -214,6 +221,7 @@ class Writer(ABC):
         return piece[0] if piece[1] >= strength else self.parenthesize(piece[0])
 
     def _call(self, node: Node, args: list[Piece]) -> Piece:
+        """Text of conditions, comparisons, reductions, tables and functions."""
         texts = [text for text, _ in args]
         match node.op:
             case "cond":

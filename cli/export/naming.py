@@ -28,6 +28,7 @@ def unknowns(formed: Formed, *, si: bool = False) -> list[dict[str, Any]]:
     moving = system.differential(system.jacobian(formed.state.t, y, yd)[1])
     found: list[dict[str, Any]] = []
     place = 0
+    # in the order of y, of the explicit form states alone
     for k, family in enumerate(families):
         if family.kind in BESIDE or (state and family.kind not in ("q", "f", "p", "s")):
             continue
@@ -39,6 +40,7 @@ def unknowns(formed: Formed, *, si: bool = False) -> list[dict[str, Any]]:
         for own, size in _entries(name, family):
             found.append({**own, **plain, **(_slice_entry(place, size) if si else {})})
             place += size
+    # the multipliers nu that index 2 adds
     for k in system.description.families_of("kappa") if system.unknowns > system.form.written else ():
         family = families[k]
         plain = {"kind": "nu", "unit": _nu_unit(formed, k), "differential": False}
@@ -90,7 +92,9 @@ def rows(formed: Formed) -> list[dict[str, Any]]:
     form, system, formulation = formed.prepared.compiled.form, formed.system, formed.prepared.formulation
     families = system.description.families
     found: list[dict[str, Any]] = []
+    # a slope for each state
     if system.form.name == "0":
+        # q' = f, then groups as the form has them
         for k, family in enumerate(families):
             if family.kind in ("q", "f", "p", "s"):
                 found += _labels(family.name, family, "slope", form.families[k].place)

@@ -160,6 +160,7 @@ def assembly_tables(system: System) -> Assembled:
         Call(planned.block, planned.at, planned.to, slots[2 * k + 2], slots[2 * k + 3])
         for k, planned in enumerate(form.calls)
     )
+    # rows that a held unknown replaces
     held_row, held_unknown = system.held
     cleared = np.flatnonzero(np.isin(system.pattern.row, held_row)).astype(np.int32)
     return Assembled(

@@ -24,6 +24,7 @@ BESIDE = ("structure", "meter", "run")
 def what_changed(golden: Golden, wanted: Golden, found: Recorded) -> tuple[str | None, str]:
     """(one line, all of it) of what differs between what is kept and what was found; None: nothing."""
     lines, first = [], None
+    # the traces
     try:
         verdict = differences(load_golden(golden), found.trace, tolerance_of(golden))
         if not verdict.equal:
@@ -32,12 +33,14 @@ def what_changed(golden: Golden, wanted: Golden, found: Recorded) -> tuple[str |
     except (Incomparable, TraceError, OSError) as error:
         first = f"{error.filename}: {error.strerror}" if isinstance(error, OSError) else str(error)
         lines.append(first)
+    # the facts of structure, formulation by formulation
     try:
         kept = json.loads(golden.structure.read_text(encoding="utf-8"))["formulations"]
     except (OSError, ValueError, KeyError, TypeError) as error:
         kept = {}
         lines.append(f"{golden.structure}: {error}")
     new = json.loads(json.dumps(found.structure))
+    # what is new, gone or another
     for name in dict.fromkeys((*kept, *new)):
         if name not in kept or name not in new:
             lines.append(f"formulation {name} is {'new' if name in new else 'gone'}")
@@ -50,6 +53,7 @@ def what_changed(golden: Golden, wanted: Golden, found: Recorded) -> tuple[str |
         ]
     if wanted.rtol != golden.rtol:
         lines.append(f"rtol {golden.rtol:g} becomes {wanted.rtol:g}")
+    # bounds of ledgers that grow a lot
     for name in ("energy", "constraints"):
         before, after = getattr(golden, name), getattr(found, name)
         if after > 10.0 * before:

@@ -127,6 +127,9 @@ def check(
 
 
 def _case(golden: Golden, formulation: str, method: str, backend: str, with_page: bool) -> Case:
+    """Run one formulation, method and backend of a golden and compare; what stops it is the case's message and exit
+    code.
+    """
     began = time.monotonic()
 
     def stopped_case(code: int, message: str) -> Case:
@@ -134,6 +137,7 @@ def _case(golden: Golden, formulation: str, method: str, backend: str, with_page
         wrong = (("run", message),)
         return Case(golden.label, formulation, method, backend, code, message, np.inf, None, None, seconds, wrong)
 
+    # what is kept
     try:
         kept = load_golden(golden)
         structure = structure_of(golden, formulation)
@@ -141,6 +145,7 @@ def _case(golden: Golden, formulation: str, method: str, backend: str, with_page
         return stopped_case(INPUT_OUTPUT, str(error))
     except OSError as error:
         return stopped_case(INPUT_OUTPUT, f"{error.filename}: {error.strerror}")
+    # the run
     try:
         options = {"formulation": formulation, "backend": backend, "method": method or None}
         one = run(request_of(golden, **options), between(kept.time))
@@ -155,6 +160,7 @@ def _case(golden: Golden, formulation: str, method: str, backend: str, with_page
         return stopped_case(INPUT_OUTPUT, str(error))
     except Incomparable as error:
         return stopped_case(SOLVER, f"the traces cannot be compared: {error}")
+    # structure and ledgers before traces: they say more
     wrong = [*_structural(structure, one.structure), *_meters(golden, one)]
     judged = (*wrong, *cases(verdict))
     failed = next((text for _, text in wrong if text is not None), None)
@@ -162,6 +168,7 @@ def _case(golden: Golden, formulation: str, method: str, backend: str, with_page
     worst = verdict.worst
     different = not verdict.equal or failed is not None
     page = ""
+    # a page with pictures of what differs
     if with_page and different:
         from sysdyn.cli.compare.comparison_page import section
 
@@ -219,8 +226,10 @@ def mutate(golden: Golden) -> Iterator[Mutant]:
     formulation = golden.formulations[0]
     structure = structure_of(golden, formulation)
     base = run(request_of(golden, formulation=formulation), between(kept.time))
+    # some of the parameters where there are many
     for name in _some(base.parameters):
         value = base.parameters[name]
+        # no share of zero
         if value == 0.0 or not np.isfinite(value):
             yield Mutant(golden.label, name, None, 0.0, f"it is {value:g}: a share of it changes nothing")
             continue
@@ -228,15 +237,18 @@ def mutate(golden: Golden) -> Iterator[Mutant]:
         try:
             one = run(request_of(golden, formulation=formulation, settings=settings), between(kept.time))
             verdict = _verdict(golden, kept, one, structure)
+        # refused: noticed too
         except (Stopped, UsageError, Incomparable) as error:
             message = error.message if isinstance(error, UsageError) else str(error)
             yield Mutant(golden.label, name, True, np.inf, f"the model refuses it: {message}")
             continue
         worst = verdict.worst
         ratio = worst.worst.ratio if worst else 0.0
+        # noticed
         if not verdict.equal:
             yield Mutant(golden.label, name, True, ratio, "")
             continue
+        # not noticed: because nothing traced depends on it, or because the tolerance is wide
         effect = _effect(base, one, tolerance_of(golden))
         insensitive = effect < NO_EFFECT
         reason = f"it moves no traced quantity by more than {effect:.2g} of its limit: " + (

@@ -37,28 +37,36 @@ _DOMAINS = ("node", "port", "branch", "coord", "cocoord")
 def complete(document: Document, offset: int) -> list[dict[str, Any]]:
     """What may stand at a place, the nearest first."""
     source = document.source
+    # in a remark or a text
     if sight.quiet(document, offset):
         return []
     line, _ = source.position(offset)
     before = source.text[source.line_starts[line - 1] : offset]
     begun = _BEGUN.search(before)
     start = offset - (len(begun[0]) if begun else 0)
+    # from M import |
     if (match := _IMPORT.match(before)) is not None:
         module = sight.module_of(source, tuple(match[1].split(".")))
         return [] if module is None else [_item_of(d) for d in outline.items(module)]
+    # from |
     if (match := _FROM.match(before)) is not None:
         return _modules(match[1])
     statement = re.split(r"[;{}]", before)[-1]
+    # 3 |: a unit
     if _NUMBER.search(statement):
         return _units()
+    # motor.|: its members
     if (path := sight.path_before(source, start)) and (owner := sight.owner_of(document, path, offset)) is not None:
         return _members(document, path, owner, offset)
+    # coord x: |, param k: |
     if (match := _DECLARED.match(statement)) is not None:
         return _domains(document) if match[1] in _DOMAINS else _units()
     inside = isinstance(sight.item_at(document, offset), (syntax.Model, syntax.Component))
     words = expected_words(SourceText(source.name, source.text[:start]))
+    # R1: |
     if inside and (match := _LABEL.match(statement)) is not None and match[1] not in words:
         return _components(document)
+    # anywhere else: arguments of an element, words and names
     return [*_arguments(document, statement), *_expression(document, offset, words)]
 
 

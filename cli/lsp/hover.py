@@ -59,12 +59,15 @@ def _code(code: str) -> str:
 
 def _descriptions(document: Document, word: sight.Word) -> list[str]:
     """What is known of a word, one text for each of its declarations."""
+    # a unit
     if document.marks.unit(word.start):
         found = units.find_unit(word.name)
         return [] if found is None else [f"`{word.name}`: {float(found[1]):.12g} {units.si_text(found[0])}"]
     declared = sight.find(document, word)
+    # a name of the text: its declaration
     if declared:
         return [_describe(document, word, d) for d in declared[:4]]
+    # R1.e: the variable of an element
     if word.path:
         owner = sight.owner_of(document, word.path, word.start)
         letter = word.name.rstrip("12")
@@ -72,8 +75,10 @@ def _descriptions(document: Document, word: sight.Word) -> list[str]:
             unit = _unit(document, word)
             return [f"`{'.'.join((*word.path, word.name))}`: {LETTERS[letter]}{unit}"]
         return []
+    # e, f, q, p in a law
     if word.name.rstrip("12") in sight.OWN and sight.instance_at(document, word.start) is not None:
         return [f"`{word.name}`: {LETTERS[word.name.rstrip('12')]} of the element"]
+    # words of the language
     if word.name in (*ONE_PORTS, *TWO_PORTS):
         return [f"`{word.name}`: an element of the language (`sysdyn help elements`)"]
     if word.name in FUNCTIONS:
@@ -158,6 +163,7 @@ def references(document: Document, offset: int, with_declaration: bool) -> list[
     if word is None or not wanted:
         return []
     found = []
+    # wherever the word stands as a name, and means the same declaration
     for match in re.finditer(rf"(?<!\w){re.escape(word.name)}(?!\w)", document.source.text):
         other = sight.word_at(document, match.start()) if match.start() in document.marks.names else None
         if other is None:
@@ -174,16 +180,21 @@ def rename_edits(document: Document, offset: int, name: str) -> dict[str, Any]:
     """The change that gives the word under the cursor another name in this text; ValueError where that cannot be."""
     word = sight.word_at(document, offset)
     declared = [] if word is None else sight.find(document, word)
+    # nothing of this text under the cursor
     if word is None or not declared:
         raise ValueError("there is no name of the text to be changed here")
+    # names in unreadable lines would stay
     if any(d.severity == "error" for d in document.tree_and_problems[1]):
         raise ValueError("the text has errors of syntax: names in what cannot be read would be left")
+    # declared in another file
     if any(d.place.source is not document.source for d in declared):
         raise ValueError(f"'{word.name}' is declared in {declared[0].place.file}")
+    # no name at all, or one of the language
     if not name.isidentifier() or name in words():
         raise ValueError(f"'{name[:60]}' cannot be a name")
     if name in PREDEFINED:
         raise ValueError(f"'{name}' cannot be a name: the language has it already")
+    # a name that is there already
     other = sight.Word(word.path, name, declared[0].place.span.start, declared[0].place.span.start)
     if sight.find(document, other):
         raise ValueError(f"'{name}' is declared already")

@@ -26,6 +26,7 @@ def run(source: int, target: int) -> int:
 
     server, inbox = Server(send), Inbox()
     try:
+        # messages of the client and answers of the checker, whichever comes first
         while server.exit_code is None:
             left = server.checker.go_on()
             pipe = server.checker.pipe
@@ -34,6 +35,7 @@ def run(source: int, target: int) -> int:
                 server.publish_check(*server.checker.answer())
             if source in ready:
                 data = os.read(source, CHUNK)
+                # the client ended its output
                 if not data:
                     return 1
                 for message in inbox.put(data):

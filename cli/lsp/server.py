@@ -76,17 +76,21 @@ class Server:
             self._refuse(None, message.code, str(message))
             return
         method, number = message.get("method"), message.get("id")
+        # ids are numbers or texts
         if number is not None and type(number) not in (int, str):
             self._refuse(None, wire.INVALID_REQUEST, "the id of a message is a whole number or a text")
             return
+        # an answer to what was never asked, or nonsense
         if not isinstance(method, str):
             if "id" not in message or not ("result" in message or "error" in message):
                 self._refuse(number, wire.INVALID_REQUEST, "a message without a method")
             return  # an answer: nothing was asked
         params = message.get("params")
         given = params if isinstance(params, dict) else {}
+        # a request wants an answer, whatever happens
         if "id" in message:
             self._answer(number, method, given)
+        # notifications count between initialize and shutdown
         elif method == "exit" or (self._initialized and not self._shut and method in self._notifications):
             try:
                 self._notifications[method](given)
@@ -153,6 +157,7 @@ class Server:
             self.checker.ask(document.name)
 
     def _close_document(self, params: dict[str, Any]) -> None:
+        """Forget a document that was closed; files that import it are checked again as it is on disk."""
         document = self._documents.get(params["textDocument"]["uri"])
         if document is None:
             return

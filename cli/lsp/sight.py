@@ -138,22 +138,28 @@ def find(document: Document, word: Word) -> list[Declared]:
     if document.marks.unit(word.start):
         return []
     around = instance_at(document, word.start)
+    # inside of an element's statement
     if around is not None and not word.path:
         of = ".".join(around.component.names)
         if of in ONE_PORTS and word.name in OWN and any(_is_inside(word, arg) for arg in around.args or ()):
             return []  # the element's own variable
+        # names of arguments of the language
         if of in TWO_PORTS and any(arg.span.start == word.start for arg in around.args or ()):
             return []
+        # names of arguments are the component's
         if any(word.start == start for start in inner_names(around)):
             inside = members(document, (around.decl.name,), word.start)
             return [d for d in inside if d.name == word.name]
+    # a.b: among the members of a
     if word.path:
         return [d for d in members(document, word.path, word.start) if d.name == word.name]
     marks = document.marks
+    # the name of a level
     if word.start in marks.levels:
         target = marks.levels[word.start]
         among = local(document, word.start) if target is None else _inside(document, target)
         return [d for d in among if d.name == word.name and d.kind == "level"]
+    # local names before those of the file
     near = [d for d in local(document, word.start) if d.name == word.name and d.kind != "level"]
     if word.start in marks.domains or (around is not None and around.component.span.start == word.start):
         near = []  # labels and values do not hide it

@@ -168,6 +168,7 @@ def picture(entry: Entry) -> str:
     inputs = [p["name"] for p in parameters(entry.item) if p["kind"] == "input"]
     outputs = [p["name"] for p in found if p["kind"] == "output"]
     nodes = [f"{p['name']} ({p['domain']})" for p in found if p["kind"] == "port"]
+    # nodes on both sides, branches from left to right
     half = (len(nodes) + 1) // 2
     left, right = [f"{n} o--" for n in nodes[:half]], [f"--o {n}" for n in nodes[half:]]
     for b in branches:
@@ -176,6 +177,7 @@ def picture(entry: Entry) -> str:
         right.append(f"--o {name}b")
     left += [f"{n} -->" for n in inputs]
     right += [f"--> {n}" for n in outputs]
+    # both sides as high as the longer one
     height = max(len(left), len(right), 1)
     left += [""] * (height - len(left))
     right += [""] * (height - len(right))

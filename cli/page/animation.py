@@ -144,11 +144,13 @@ def _stage(it: Film, links: Sequence[Link]) -> tuple[str, float]:
     unit = units[0] if units else "1"
     placed = [[_place(it, point, unit) for point in link] for link in links]
     x, y = (np.concatenate([p[k] for link in placed for p in link]) for k in (0, 1))
+    # both axes at one scale, with a margin
     size = max(np.ptp(x), np.ptp(y)) or max(abs(x).max(), abs(y).max()) or 1.0
     wide, tall = np.ptp(x) + 0.1 * size, np.ptp(y) + 0.1 * size
     pixels = min((WIDTH - LEFT - RIGHT) / wide, (TALLEST - TOP - BOTTOM) / tall)
     left, bottom, height = x.min() - 0.05 * size, y.min() - 0.05 * size, pixels * tall + TOP + BOTTOM
     parts = []
+    # grid lines and their numbers
     for value, label in ticks(left, left + wide, 6):
         u = LEFT + pixels * (value - left)
         parts.append(f'<line class="grid" x1="{u:.1f}" x2="{u:.1f}" y1="{TOP}" y2="{height - BOTTOM:.1f}"/>')
@@ -158,6 +160,7 @@ def _stage(it: Film, links: Sequence[Link]) -> tuple[str, float]:
         parts.append(f'<line class="grid" x1="{LEFT}" x2="{LEFT + pixels * wide:.1f}" y1="{v:.1f}" y2="{v:.1f}"/>')
         parts.append(f'<text x="{LEFT - 6}" y="{v + 4:.1f}" text-anchor="end">{label}</text>')
     parts.append(f'<text x="4" y="{TOP - 3}">[{escape(unit_text(unit) or "1")}]</text>')
+    # points that belong together in one colour
     for k, link in enumerate(placed):
         across = [(LEFT + pixels * (a - left), height - BOTTOM - pixels * (b - bottom)) for a, b in link]
         parts += _drawn(it, across, COLOURS[k % len(COLOURS)])

@@ -23,15 +23,18 @@ def outline(source: Source, name: str, low: float, high: float, scale: float = 1
     scale: of the source's time to s.
     """
     time = source.time * scale
+    # the window, and an instant beyond it on each side
     a = max(int(np.searchsorted(time, low, side="left")) - 1, 0)
     b = min(int(np.searchsorted(time, high, side="right")) + 1, time.size)
     values, rates = source.read(name, a, b)
     time = time[a:b]
+    # many points: least and largest of each column
     if time.size > 2 * COLUMNS:
         edges = np.unique(np.searchsorted(time, np.linspace(time[0], time[-1], COLUMNS + 1)[:-1]))
         with np.errstate(invalid="ignore"):
             least, most = np.minimum.reduceat(values, edges), np.maximum.reduceat(values, edges)
         x, y = np.repeat(time[edges], 2), np.stack([least, most], axis=1).ravel()
+    # few: the curve between them
     elif time.size > 1 and time[-1] > time[0]:
         grid = np.linspace(max(low, time[0]), min(high, time[-1]), COLUMNS)
         curve = Curve(time, values, None if rates is None else rates / scale)
@@ -43,6 +46,7 @@ def outline(source: Source, name: str, low: float, high: float, scale: float = 1
         x, y = time, values
     inside = (x >= low) & (x <= high)
     x, y = x[inside], y[inside]
+    # what is no number interrupts the line
     breaks = np.flatnonzero(np.diff(np.isfinite(y).astype(int)) != 0) + 1
     pieces = zip(np.split(x, breaks), np.split(y, breaks), strict=True)
     return [(px, py) for px, py in pieces if py.size and np.isfinite(py).all()]

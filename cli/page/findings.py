@@ -100,6 +100,7 @@ def sarif(found: Sequence[Diagnostic], plain: Plain) -> str:
 
 
 def _result(d: Diagnostic, rule: int) -> dict[str, Any]:
+    """A finding as a result of SARIF, with places, notes and the change that mends it."""
     text = d.message + (f"\nhelp: {d.help}" if d.help else "")
     result: dict[str, Any] = {"ruleId": d.code, "ruleIndex": rule, "level": d.severity, "message": {"text": text}}
     if d.place is not None:

@@ -60,16 +60,19 @@ def quantities(traces: list[Trace], wanted: list[str]) -> list[str]:
     from sysdyn.cli.page.panels import in_order
 
     known = in_order(dict.fromkeys(name for trace in traces for name in trace.names))
+    # all that was traced
     if not wanted:
         if not known:
             raise UsageError(f"{traces[0].path} has no quantities: name a meter, audit/energy or audit/constraints")
         return known
     spelled = {name: name for name in known}
+    # ledgers under either spelling
     for trace in traces:
         for meter in ("audit.energy", "audit.constraints"):
             if meter in trace:
                 spelled |= {meter: meter, meter.replace(".", "/"): meter, "/" + meter.replace(".", "/"): meter}
     drawn = []
+    # as the trace spells it, once each
     for name in wanted:
         found = spelled.get(name) or spelled.get(trace_name(name))
         if found is None:

@@ -111,6 +111,7 @@ def _head(axes: Any, traces: Sequence[tuple[str, Trace]]) -> None:
 
 
 def _draw(axis: Any, panel: Panel, traces: Sequence[tuple[str, Trace]], scale: float) -> None:
+    """Draw the curves of a panel, with a legend where there are several."""
     curves = []
     for name, trace, label, colour, k in styled_curves(panel, traces):
         time, values = curve(trace, name, panel.unit)

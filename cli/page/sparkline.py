@@ -19,6 +19,7 @@ def summary(traces: Sequence[tuple[str, Trace]], names: Sequence[str], width: in
     rows: list[tuple[str, ...]] = [("quantity", "unit", "min", "max")]
     curves: list[tuple[Floats, Floats]] = []
     for name in names:
+        # a row for each trace that has the quantity
         for label, trace in traces:
             if name not in trace:
                 continue
@@ -28,6 +29,7 @@ def summary(traces: Sequence[tuple[str, Trace]], names: Sequence[str], width: in
             rows.append((_plain(shown), _plain(unit_text(trace[name].units)) or "1", *ends))
             curves.append(curve(trace, name))
     heads = align(rows, right=(2, 3)).split("\n")
+    # numbers first: curves take the columns that are left
     room = max(map(len, heads))
     wide = max(width - room - 2, NARROW)
     scale, unit = time_unit([t for _, t in traces])

@@ -44,6 +44,7 @@ def candidates(target: Target, network: Network, found: Sequence[Activity]) -> t
     source = target.document.file.source
     groups: dict[tuple[int, int], list[Activity]] = {}
     owners: dict[tuple[int, int], syntax.Statement] = {}
+    # parts of one statement together: an array goes as a whole
     for activity in found:
         statement = _statement(target, activity)
         if statement is not None:
@@ -53,6 +54,7 @@ def candidates(target: Target, network: Network, found: Sequence[Activity]) -> t
     made = []
     for key, group in groups.items():
         statement = owners[key]
+        # sources drive the model
         if all(a.role in ("in", "through") for a in group):
             continue
         name = statement.decl.name if isinstance(statement, syntax.Instance) else ""

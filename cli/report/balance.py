@@ -78,6 +78,7 @@ def add_observations(network: Network) -> tuple[Network, tuple[Part, ...]]:
             return network, ()
     unit = si(dim.ENERGY)
     states, dynamics, initials, extra = [], [], [], []
+    # a power is integrated by a state, an energy is observed as it is
     for part in parts:
         value = part.expression
         if part.power:
