@@ -233,8 +233,7 @@ def _whole(tables: Tables) -> Iterable[str]:
 
 
 def _state(state: State, system: Assembled) -> Iterable[str]:
-    """Tables of the explicit form: the matrix of rates and multipliers, and where the state stands among all unknowns.
-    """
+    """Tables of the explicit form: the matrix of rates and multipliers, and the places of the state."""
     chosen, calls = state.selection, len(system.calls)
     yield _MATRIX
     yield ints("state_place", state.places)

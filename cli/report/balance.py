@@ -158,6 +158,7 @@ def _ranges(pieces: Sequence[Branch]) -> str:
 
 
 def _of_statements(network: Network) -> Iterator[list[Part]]:
+    """Parts of energies and works, named by their line; those whose power cannot be written are left out."""
     counts: dict[str, int] = {}
     domains = {c.name: c.domain.name for c in network.coordinates if c.domain is not None}
     statements: tuple[Energy | Work, ...] = (*network.energies, *network.works)
@@ -167,6 +168,7 @@ def _of_statements(network: Network) -> Iterator[list[Part]]:
         label = f"{kind} (line {statement.place.start[0]})"
         try:
             role, power, value = _measure(statement)
+        # that statement is missing from the balance, not the page
         except (ModelError, ValueError):  # a product over a range has no derivative here
             continue
         domain = next((domains[n.data[0]] for n in local_variables(value, _KINDS) if n.data[0] in domains), "")
@@ -249,6 +251,7 @@ def joules(value: float) -> str:
 
 def _bars(parts: Sequence[Share]) -> str:
     """The largest as bars about zero."""
+    # the largest, in either direction
     drawn = sorted((p for p in parts if p.role != "through" and np.isfinite(p.energy)), key=lambda p: -abs(p.energy))
     drawn = [p for p in drawn[:24] if abs(p.energy) > 0.0]
     if not drawn:
@@ -259,6 +262,7 @@ def _bars(parts: Sequence[Share]) -> str:
     zero = left - low * scale
     height = step * len(drawn) + 8
     body = []
+    # a bar about zero, its name on the left and its number at its end
     for k, p in enumerate(drawn):
         x, w = zero + min(p.energy, 0.0) * scale, max(abs(p.energy) * scale, 0.5)
         y = 4 + step * k

@@ -59,9 +59,11 @@ def _study(
     began: float,
     progress: Progress | None,
 ) -> Study | None:
+    """Start and run a scene for the page, without a file; None where the report says why not."""
     scene = prepared.network.scene
     findings: list[str] = []
     ran, trace, found = None, None, None
+    # a scene without time: the start alone
     if request.until is None and (scene is None or scene.end is None):
         with _time_stage("start", stages):
             started = start(prepared, 0.0, report, request.redundancy)
@@ -70,10 +72,12 @@ def _study(
         options = options_of(request, target, prepared, report, began, progress)
         if options is None:
             return None
+        # every step, in memory
         options = replace(options, output=None, every=None)
         with _time_stage("start, integration and trace", stages):
             ran = integrate(target, prepared, options, report)
         started = ran.started if ran is not None else None
+        # the energy balance takes a run of its own
         if ran is not None:
             trace = ran.outcome.traced
             _split(stages, ran)

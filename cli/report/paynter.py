@@ -58,6 +58,7 @@ def _head(edge: str) -> str:
 
 
 def _of_branches(study: Study) -> list[list[str]]:
+    """Rows of Paynter's diagram for branches and couplings: the law at its edge."""
     types = study.typesetter_of_text
     rows = []
     for branch in study.network.branches:
@@ -65,12 +66,15 @@ def _of_branches(study: Study) -> list[list[str]]:
             continue
         name = study.link(branch.place, escape(author_name(branch.name))) + _where(branch, types)
         cells = dict.fromkeys(EDGES, "")
+        # a law: at the edge of its kind
         if branch.law is not None and branch.side is not None and branch.kind in _EDGE:
             left = types.expression(var(branch.name, f"b{branch.side}", *branch.at))
             cells[_EDGE[branch.kind]] = math(left, mo("="), types.expression(branch.law))
+        # its laws are derivatives of a stated energy
         elif branch.kind == "field":
             cells["p-f"] = '<span class="soft">in the energies</span>'
         rows.append([name, escape(branch.domain.name), *cells.values()])
+    # a coupling relates efforts or flows of two branches
     for c in study.network.couplings:
         one = types.expression(var(c.first, f"b{c.side}", *c.at))
         two = types.expression(var(c.second, f"b{c.read}", *c.at))
@@ -90,6 +94,7 @@ def _where(branch: Branch, types: Typesetter) -> str:
 
 
 def _of_statements(study: Study) -> list[list[str]]:
+    """Rows of Paynter's diagram for energies, works and constraints."""
     rows = []
     n = study.network
     for energy in n.energies:

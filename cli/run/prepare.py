@@ -116,9 +116,11 @@ def prepare(
     """
     cpu = time.process_time()
     whole, place = network, None
+    # what is left out must be well-formed all the same
     network, left_out = prune_network(whole) if prune else (whole, ())
     if left_out and not _well_formed(whole, report):
         return None
+    # the scene's own, with its place for findings
     if formulation is None:
         formulation = (network.scene.formulation if network.scene else None) or "auto"
         place = network.scene.formulation_place if network.scene else None
@@ -126,6 +128,7 @@ def prepare(
     report.extend(load.at_authors(network, found))
     if found:
         return None
+    # lowering may find what the rules of the text did not
     try:
         compiled, made, backend = _compile_and_load(network, chosen, backend, report, traced, gather)
         binding = compiled.bind()
@@ -153,6 +156,7 @@ def _well_formed(network: Network, report: Report) -> bool:
 def _compile_and_load(
     network: Network, formulation: str, backend: str, report: Report, traced: bool, gather: bool
 ) -> tuple[CompiledModel, Carrier, str]:
+    """Compile and load a network by C, or by NumPy where there is no compiler, which N609 notes."""
     if backend == "c":
         compiled = compile_network(network, formulation, "c", traced=traced, gather=gather)
         try:

@@ -166,6 +166,7 @@ def _same(one: str, other: str) -> bool:
 
 
 def _ran(target: Target, prepared: Prepared, started: Started, options: Options, report: Report) -> Ran | None:
+    """Integrate a started model, judge claims and report; None where its form does not exist."""
     failure = None
     try:
         outcome = simulate(
@@ -177,6 +178,7 @@ def _ran(target: Target, prepared: Prepared, started: Started, options: Options,
         return None
     except WrongOption as error:
         raise UsageError(str(error)) from error
+    # it stopped: what was computed until then is the outcome
     except SolverFailure as error:
         if not isinstance(error.partial, Outcome):
             raise
@@ -184,11 +186,13 @@ def _ran(target: Target, prepared: Prepared, started: Started, options: Options,
         failure = report_stop(target, prepared, started, error, report, options)
     found = Report()
     claims = judge(prepared, outcome, found, finished=outcome.reached >= options.t_end)
+    # claims are judged of a run that is met
     if outcome.judgement is None or outcome.met:
         report.extend(found)
         code = 3 if failure else 1 if report.failed else 0
     else:  # what such a run says of the author's claims is not believed
         claims, code = tuple(replace(claim, ok=None) for claim in claims), 3
+    # what the run says of itself, and what looks odd
     if outcome.judgement is not None:
         verdict(target, prepared, started, outcome, report)
         differences(prepared, outcome.cancelled, report)

@@ -41,6 +41,7 @@ class Calls:
         names = _parameters(netlist.top)
         way, on = [netlist.top], {netlist.top}
         opened: dict[Circuit, tuple[Use, Iterator[tuple[Card, Circuit]]]] = {}
+        # depth first: a circuit after those that it calls
         while way:
             circuit = way[-1]
             if circuit not in opened:
@@ -51,6 +52,7 @@ class Calls:
             if call is None:
                 self._finish(circuit, use, names)
                 on.discard(way.pop())
+            # a subcircuit that contains itself
             elif call[1] in on:
                 raise _unreadable(call[0], f"'{call[1].name}' is inside itself")
             elif call[1] not in self.uses:

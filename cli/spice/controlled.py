@@ -18,6 +18,7 @@ def controlled_source(kind: str, letter: str, unit: str, *, by_current: bool) ->
         name, a, b = scope.name[card.head], scope.node(words[1]), scope.node(words[2])
         times, words = _times(words, scope, kind == "flow")
         size = 1 if by_current else 2
+        # POLY(n) reads n quantities, a gain one
         count, rest = (_order(words), words[5:]) if words[3:4] == ("poly",) else (1, words[3:])
         controls, numbers = rest[: size * count], rest[size * count :]
         if "=" in words or any("=" in w for w in words) or len(controls) < size * count or not numbers:
@@ -28,8 +29,10 @@ def controlled_source(kind: str, letter: str, unit: str, *, by_current: bool) ->
             for k in range(count)
         ]
         gains = [times * value(w, scope.known) for w in numbers]
+        # a polynomial
         if words[3:4] == ("poly",):
             text = _polynomial(gains, read, "A" if by_current else "V", "V" if kind == "effort" else "A")
+        # something behind the gain
         elif len(gains) > 1:
             raise Unreadable(f"'{card.text[:60]}': '{numbers[1]}' behind the gain is not known")
         else:
@@ -60,6 +63,7 @@ def _polynomial(gains: list[float], read: list[str], unit: str, result: str) -> 
     if len(gains) == 1:
         raise Unreadable("POLY with one number: a gain in SPICE2, a constant in ngspice; '0 GAIN' or no POLY is both's")
     terms, degree, at = [plain(gains[0])], 1, 1
+    # all products of one degree before those of the next
     while at < len(gains):
         for factors in combinations_with_replacement(read, degree):
             if at < len(gains) and gains[at] != 0.0:

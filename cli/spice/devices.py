@@ -106,6 +106,7 @@ def details(words: tuple[str, ...], scope: Scope, *, areas: bool) -> Details:
     left_ = [w for w in words if w != "off"]
     times, given, rest = 1.0, dict[str, str](), []
     while left_:
+        # NAME = VALUE, some with two values
         if left_[1:2] == ["="] and len(left_) > 2:
             name, _, text = left_[:3]
             given[name] = text
@@ -115,9 +116,11 @@ def details(words: tuple[str, ...], scope: Scope, *, areas: bool) -> Details:
             elif name in PAIRS and left_ and left_[1:2] != ["="] and _is_value(left_[0]):
                 given[f"{name} 2"] = left_[0]
                 left_ = left_[1:]
+        # a number alone is the area
         elif areas and _is_value(left_[0]):
             times *= value(left_[0], scope.known)
             left_ = left_[1:]
+        # words that the device may know
         else:
             rest.append(left_[0])
             left_ = left_[1:]
@@ -131,6 +134,8 @@ def _is_value(word: str) -> bool:
 
 
 def _passive(kind: str, letter: str, unit: str, state: str, state_unit: str) -> Callable[[Card, Scope], Element]:
+    """The reader of R, C and L cards: value with temperature and number, and the initial value where it is said."""
+
     def element(card: Card, scope: Scope) -> Element:
         words = enough(card, 4)
         named = words[3:5] == (letter.lower(), "=")
@@ -173,6 +178,7 @@ def _initial(state: str, unit: str, words: tuple[str, ...], said: Details, scope
 
 
 def _source(unit: str) -> Callable[[Card, Scope], Element]:
+    """The reader of V and I cards."""
     kind, letter = ("voltage", "v") if unit == "V" else ("current", "i")
 
     def element(card: Card, scope: Scope) -> Element:
@@ -206,11 +212,14 @@ def _shape(words: list[str], scope: Scope, unit: str) -> Shape:
     words = [w for w in words if w not in ("=", ",")]
     while words:
         word, words = words[0], words[1:]
+        # PULSE, SIN, PWL, ...
         if word in SHAPES and found is None:
             texts, words = _arguments(words)
             found = SHAPES[word]([value(w, scope.known) for w in texts], asked)
+        # AC and others: of analyses that are not made
         elif word in SMALL:
             words = words[sum(_is_value(w) for w in words[: SMALL[word]]) :]
+        # the constant value
         elif word != "dc" and constant is None and (_is_value(word) or word in scope.known):
             constant = value(word, scope.known)
         elif word != "dc":

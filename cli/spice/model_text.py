@@ -103,6 +103,7 @@ class Writer:
         return next(iter(self.netlist.top.elements.values()))
 
     def _whole(self, model: str, body: list[str]) -> str:
+        """The model's text: imports, components, the top circuit, and the scene that its analysis asks for."""
         netlist, top = self.netlist, self.netlist.top
         asked = scene(netlist, model, self.names[top].nodes, self._read(top))
         if netlist.tran is not None and netlist.tran[2] > 0.0:
@@ -176,10 +177,13 @@ class Writer:
         return {head: f"init {named.labels[head]}.e = {quantity(volt, 'V')}" for head, volt in held.items()}
 
     def _element(self, card: Card, scope: Scope, cores: Cores, write_call: Callable[[Card], Element]) -> Element:
+        """An element of a card; E941 of one that cannot be read, W941 of what is left out."""
         letter = card.head[0]
         try:
+            # a subcircuit
             if letter == "x":
                 found = write_call(card)
+            # coupled inductors
             elif letter == "k":
                 found = coupled_coils(card, scope, cores)
             elif letter in DEVICES:

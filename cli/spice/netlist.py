@@ -129,6 +129,7 @@ def value(text: str, known: Mapping[str, float]) -> float:
 
 
 def _value(text: str, known: Mapping[str, float]) -> float:
+    """Number of a text: a literal, a parameter, or an expression of both; Unreadable otherwise."""
     plain = text.strip("{}'").strip()
     found = number(plain)
     if found is not None:
@@ -144,6 +145,7 @@ def _value(text: str, known: Mapping[str, float]) -> float:
     try:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")  # of literals that are none: they are findings here
+            # Python's parser reads it, and a walk allows what is allowed
             tree = ast.parse(_SCALED.sub(written, plain.replace("^", "**")), mode="eval")
         return _walk(tree.body, known)
     except (SyntaxError, ValueError, RecursionError, MemoryError):
@@ -153,6 +155,7 @@ def _value(text: str, known: Mapping[str, float]) -> float:
 
 
 def _walk(node: ast.AST, known: Mapping[str, float]) -> float:
+    """Value of a syntax tree of numbers, parameters, operators and functions; Unreadable of anything else."""
     if isinstance(node, ast.Constant) and isinstance(node.value, int | float):
         return float(node.value)
     if isinstance(node, ast.Name):

@@ -36,9 +36,11 @@ def evaluate(
     around = ChainMap(found, dict(outer))
     for first in said:
         way, on = [first], {first}
+        # depth first: a parameter after those that its text needs
         while way:
             name = way[-1]
             needed = () if name in found else _missing(said, found, name)
+            # not known yet: itself on the way there is a circle
             if needed:
                 if needed[0] in on:
                     raise _unreadable(said[name].card, f"the parameter '{needed[0]}' depends on itself")

@@ -40,6 +40,7 @@ class Cores:
         self._core: dict[str, tuple[str, list[str], Factors]] = {}
         self.branches: dict[str, tuple[str, str]] = {}
         before, on = set[tuple[str, str]](), dict[str, list[str]]()
+        # coils that each card couples; two that are coupled twice are an error of the second
         for card in (c for c in cards if c.head.startswith("k")):
             try:
                 self._said[card.head] = _coils_and_factor(card, coils)
@@ -52,6 +53,7 @@ class Cores:
             for coil in self._said[card.head][0]:
                 on.setdefault(coil, []).append(card.head)
         place = {head: k for k, head in enumerate(self._said)}
+        # cards that share a coil are one core
         for first in self._said:
             if first not in self._core:
                 self._gather(first, on, place)
@@ -87,6 +89,7 @@ def _branch(k: int, coils: int) -> str:
 def coupled_coils(card: Card, scope: Scope, cores: Cores) -> Element:
     """The coils of a core as one element, at the first of its cards."""
     first, names, factors = cores.core_of(card)
+    # the core stands at the first of its cards
     if first != card.head:
         return Element(())
     name, size = scope.name[card.head], len(names)
@@ -94,6 +97,7 @@ def coupled_coils(card: Card, scope: Scope, cores: Cores) -> Element:
     if not all(abs(k) <= 1.0 for k in strength.values()):
         raise Unreadable(f"'{card.head}': a factor beyond 1")
     whole = any(abs(k) == 1.0 for k in strength.values())  # what two coils carry is one flux: no current is given
+    # two coils that are not perfectly coupled: a component of the library
     pair = size == 2 and not whole
     cards_of = [enough(cores.coils[w], 4) for w in names]
     given = [f"L{k} = {number_of(scope, words[3], 'H')}" for k, words in enumerate(cards_of, 1)]
@@ -101,6 +105,7 @@ def coupled_coils(card: Card, scope: Scope, cores: Cores) -> Element:
     for (i, j), k in sorted((sorted(place[coil] for coil in two), k) for two, k in strength.items()):
         given.append(f"{'k' if pair else f'k{i}_{j}'} = {plain(k)}")
     ends, initial, currents, left = [], [], [], list[str]()
+    # each coil as a branch with its initial current
     for k, words in enumerate(cards_of):
         branch = _branch(k, size)
         ends.append(f"{branch} = {scope.node(words[1])} -> {scope.node(words[2])}")
@@ -109,6 +114,7 @@ def coupled_coils(card: Card, scope: Scope, cores: Cores) -> Element:
         currents.append(said.number("ic", scope))
         at = f"f {'~' if whole else '='} {quantity(currents[-1], 'A')}" if scope.uic else "e = 0 V"
         initial.append(f"init {name}.{branch}.{at}")
+    # perfectly coupled: the flux is what is given
     if scope.uic and whole and size == 2:
         sizes = [value(words[3], scope.known) for words in cards_of]
         mutual = next(iter(strength.values())) * math.sqrt(math.prod(sizes))

@@ -47,10 +47,12 @@ class Cases:
             self._set_up(KEEPS[keep])
 
     def _set_up(self, keep: int) -> None:
+        """Prepare runs in the core: what varies, and which instants of traces are kept."""
         loaded, prepared, scene = self._loaded, self._prepared, self._prepared.network.scene
         self._core = InCore(loaded.request, loaded.target, prepared, lambda: loaded.run({}, Report()), keep)
         self._moving = self._core.moving(key if isinstance(key, str) else key[0] for key in self._keys)
         self.time, rows = np.zeros(0), np.zeros(0, dtype=np.int64)
+        # at the scene's interval, thinned
         if keep == TRACES and scene is not None and scene.every is not None and scene.start is not None:
             times, kinds = instants(self._core.options)
             evaluate = prepared.binding.evaluate
@@ -62,9 +64,11 @@ class Cases:
         """What is kept of the cases, and the places of those that need a run of their own."""
         values = np.array([[case[name] for name in self._names] for case in cases], dtype=np.float64)
         with ex.fresh(self._compiled.nodes):
+            # numbers of all cases at once; those without are run one by one
             p, anchor, good = self._bound(values)
         good &= self._loaded.allowed_rows(self._keys, values)
         batch = self._core.batch
+        # cases that the core does not finish are run again by themselves
         found = batch.run(p[good], anchor[good])
         done = found.state == DONE
         place = np.flatnonzero(good)

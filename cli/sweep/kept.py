@@ -143,10 +143,12 @@ class Done:
         """(name, values [number]) of end, least or most; NaN where there is none; nothing where nobody kept any."""
         for name in self.names():
             column, some = np.full(number, np.nan), False
+            # runs by themselves
             for run, kept in self.singles.items():
                 value = (getattr(kept, group) or {}).get(name)
                 some |= value is not None
                 column[run] = np.nan if value is None else value
+            # runs of the core, a table each
             for block in self.blocks:
                 table = getattr(block, group)
                 if table.shape[1] and name in block.names:

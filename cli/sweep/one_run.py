@@ -128,6 +128,7 @@ def _first(diagnostics: Any) -> str:
 
 
 def _keep(number: int, ran: Ran, report: Report, keep: str) -> Kept:
+    """What is kept of a run: how it ended, and end, extrema or traces of its quantities."""
     o = ran.outcome
     trace = o.traced
     values = {name: np.asarray(trace[name]) for name in trace.names}

@@ -26,6 +26,7 @@ def picture(found: Swept, kind: str) -> bytes:
     columns = len(over) + bands
     size = (2.4 + 3.1 * columns, 1.0 + 2.2 * max(len(names), 1))
 
+    # a row for each quantity: bands over time, then ends over each parameter
     def draw(figure: Any) -> None:
         axes = figure.subplots(max(len(names), 1), columns, squeeze=False, sharex="col")
         for row, name in enumerate(names):
@@ -51,10 +52,12 @@ def _label(found: Swept, name: str) -> str:
 
 
 def _bands(axis: Any, found: Swept, kept: Sequence[Kept], name: str) -> None:
+    """Curves of few runs, or quantiles of many, over time."""
     some = [k for k in kept if k.met and k.time and k.traces]
     if not some:
         return
     time = max((k.time or [] for k in some), key=len)
+    # runs that ended earlier have no place in a quantile
     whole = [k for k in some if k.time == time]
     table = np.array([k.traces[name] for k in whole if k.traces])
     if len(found.cases) <= FEW:

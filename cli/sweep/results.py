@@ -35,12 +35,14 @@ def write(
         file.attrs["final"] = np.int64(len(done) == len(cases))
         run = file.create_dataset("run", data=np.arange(len(cases)), track_times=False)
         run.make_scale("run")
+        # columns over the runs
         for name, column, unit in _columns(cases, done, units, timings=timings):
             data = file.create_dataset(name, data=_fixed_length(column), track_times=False)
             data.dims[0].attach_scale(run)
             if unit is not None:
                 data.attrs["units"] = unit
         _traces(file, run, len(cases), done, units)
+        # then written at once, beside its place
         file.flush()
         whole_files.write(path, file.id.get_file_image())
 
@@ -102,12 +104,14 @@ def _traces(file: Any, run: Any, number: int, done: Done, units: Mapping[str, st
     times = [np.array(r.time) for r in some] + [b.time for b in blocks]
     if not times:
         return
+    # instants of all runs are the same up to their end
     longest = max(times, key=len)
     time = file.create_dataset("time", data=longest, track_times=False)
     time.make_scale("time")
     time.attrs["units"] = "s"
     for name in done.names():
         table = np.full((number, len(longest)), np.nan)
+        # runs by themselves, then blocks of the core
         for r in some:
             assert r.time is not None
             assert r.traces is not None

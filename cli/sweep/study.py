@@ -86,6 +86,7 @@ def study(axes: list[Axis], sample: str | None, runs: int | None, seed: int) -> 
         raise UsageError(f"--over {twice} twice: one list, or a grid")
     if not axes:
         raise UsageError("nothing varies: --over NAME=VALUE,VALUE,..., or a study file")
+    # what is drawn needs a number of runs, and a number needs something drawn
     drawn = [axis.name for axis in axes if axis.drawn]
     if drawn and runs is None:
         raise UsageError(f"how many runs of {', '.join(drawn)}? --runs N")

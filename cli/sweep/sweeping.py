@@ -87,6 +87,7 @@ def axes_of(runner: Runner, texts: tuple[str, ...]) -> list[Axis]:
 
 
 def _evaluate(runner: Runner) -> Evaluate:
+    """Evaluate texts of axes in the units of the model's parameters."""
     loaded = runner.load_model()
     known = {p.name: p.unit.dimension for p in loaded.first.prepared.network.parameters}
 
@@ -125,9 +126,11 @@ def sweep(
     _check_first(runner, cases[0])
     target = runner.load_model().target
     texts = lock.hashes(target)
+    # a journal of other texts or settings does not count
     digest = study.digest(request=replace(request, output=None), texts=texts, version=__version__, keep=keep)
     units, attributes = _units(runner, cases[0]), _attributes(target, study)
     place = destination(output)
+    # one sweep at a time writes a file
     with claimed(place), Journal(place, digest) as journal:
         resumed = len(journal.done)
         tasks = ((k, case) for k, case in enumerate(cases) if k not in journal.done)
@@ -136,6 +139,7 @@ def sweep(
         first: tuple[float, int] | None = None
         cost = 0.0
         try:
+            # kept as they come
             for item in _items(request, tasks, left, min(jobs, max(left, 1)), keep, dask, runner):
                 journal.take(item)
                 now = time.monotonic()
@@ -144,10 +148,12 @@ def sweep(
                 more = number - first[1]
                 ahead = (now - first[0]) / more * (left - number) if more > FORETOLD else None
                 progress(len(journal.done) / len(cases), ahead)
+                # the file is written in between, seldom enough
                 if now - written > max(REFRESH, 10.0 * cost):
                     results.write(place, cases, journal.done, units, attributes, timings=timings)
                     written = time.monotonic()
                     cost = written - now
+        # whatever happened: what is there
         finally:
             results.write(place, cases, journal.done, units, attributes, timings=timings)
         journal.remove()

@@ -67,12 +67,14 @@ def reference(bench: Bench, budget: float | None, jobs: int | None = 1) -> tuple
     sure = SURE * bench.accuracy
     ways = list(_ways(bench))
     with closing(Beside(_run_finest, (bench.request, bench.folder, ways[1], budget), jobs)) as beside:
+        # ways to run the scene, as unlike as there are
         for number, combination in enumerate(ways):
             made = beside.answer() if number == 1 else None
             run, said = made or _finest(bench, combination, budget, len(runs))
             reasons += said
             if run is None:
                 continue
+            # the nearest pair of runs that stepped differently
             for other in runs:
                 apart = error_of(
                     run.trace, other.trace, bench.judged_quantities(other.trace), bench.accuracy, bench.options.t_end
@@ -80,14 +82,17 @@ def reference(bench: Bench, budget: float | None, jobs: int | None = 1) -> tuple
                 if run.steps != other.steps and (best is None or apart < best[0]):  # equal steps are no second opinion
                     best = apart, other, run
             runs.append(run)
+            # near enough, or tried enough
             if best is not None and (best[0] <= sure or len(runs) == 3):
                 break
+    # no two runs to be compared
     if best is None:
         said = "; ".join(dict.fromkeys(text for text, _ in reasons))
         finding = next((found for _, found in reasons if found), None)
         raise NoReference(said or "there is but one way to run this scene", finding)
     uncertainty, first, second = best
     until = bench.options.t_end
+    # apart somewhere: up to there they agree
     if uncertainty > sure:
         until, _ = horizon(first.trace, second.trace, dict.fromkeys(bench.judged_quantities(first.trace), sure))
         if not until > bench.options.t_start:

@@ -132,17 +132,20 @@ class _Verification:
         """
         began = time.monotonic()
         asked: list[str | None] = []
+        # the reference first: its time tells whether processes pay
         if jobs is None or jobs == 1:
             self._formulation(None)
             if self._has_stopped():
                 return None
             asked += [name for name in EVERY if name != self.runs[0].formulation]
+        # all side by side; which formulation is the reference's is known without a run
         else:
             with ex.fresh():
                 first = ready(self.request, self.target, Report())
             asked += [None, *(name for name in EVERY if first and name != first.formulation)]
         items = [(self.request, self.folder, name) for name in asked]
         try:
+            # in the order of formulations
             for name, part in zip(asked, each(_part, items, jobs, self._here, time.monotonic() - began), strict=True):
                 if isinstance(part, Lost):
                     raise RuntimeError(f"the process of {name or 'the reference'} died ({part.how})")
@@ -150,8 +153,10 @@ class _Verification:
                     self._take(part)
                     self.done = min(self.planned, self.done + len(METHODS) + (name is None))
                     self._advance(0.0, None)
+                # without a reference there is nothing to compare
                 if name is None and self._has_stopped():
                     return None
+        # what is there is compared, once there is a reference
         except KeyboardInterrupt:
             if self.finer is None:
                 raise
@@ -207,10 +212,12 @@ class _Verification:
             self.report.extend(d for d in report if d.severity != "error")
 
     def _methods(self, prepared: Prepared, options: Options, report: Report, *, reference: bool) -> None:
+        """Run a formulation by two methods; of the reference also its own run at a finer accuracy."""
         first, second = _pair(options)
         for method in (first, second):
             inner = Report()
             ran = self._run(prepared, options, method, inner, "")
+            # the method does not exist in this formulation: auto in its place
             if ran is None and not reference and method not in METHODS and any(d.code == "E607" for d in inner):
                 self._methods(prepared, replace(options, method="auto"), report, reference=False)
                 return  # this formulation has no such method
@@ -225,6 +232,7 @@ class _Verification:
             if method != first:
                 continue
             self._facts(ran, options.t_end)
+            # bounds of the comparison come from the reference
             if reference:
                 self.span = options.t_start, options.t_end
                 self.bounds = _bounds(options, self.runs[0].trace)
@@ -284,7 +292,9 @@ class _Verification:
     # --- comparison ---------------------------------------------------------------------------------------------
 
     def _compare_runs(self, finer: Run) -> Verified:
+        """Compare all runs up to the horizon of the reference, or of a run that loses its accuracy earlier."""
         reference = self.runs[0]
+        # quantities without a bound, or missing somewhere, are named
         for name in reference.trace.names:
             if not math.isfinite(self.bounds.get(name, math.inf)):
                 self.left_out.setdefault(name, "no accuracy is asked of it")

@@ -113,8 +113,10 @@ class Crew:
             self.end()
 
     def _receive(self, worker: _Worker) -> Iterator[Any]:
+        """Take a worker's answer and give it the next job; what the supply makes of one that died."""
         try:
             answer = worker.pipe.recv()
+        # it died: by a signal, or by an exit of its own
         except (EOFError, OSError):
             worker.process.join()
             worker.pipe.close()
@@ -125,6 +127,7 @@ class Crew:
             return
         found = list(self._supply.took(worker.job, answer, time.monotonic() - worker.began))
         job = self._supply.next()
+        # nothing left for it
         if job is None:
             worker.pipe.close()
             self._workers.remove(worker)
@@ -240,6 +243,7 @@ def each(
     item raises is raised in its turn.
     """
     done, took = 0, [] if like is None else [like]
+    # here, as long as processes would not pay
     while done < len(items) and _stays(took, len(items) - done, jobs if done or len(items) > 1 else 1):
         began = time.monotonic()
         answer = (here or function)(items[done])
@@ -249,6 +253,7 @@ def each(
     if done == len(items):
         return
     found: dict[int, Any] = {}
+    # then by workers; answers wait for their turn
     for k, answer in Crew(_Items(deque(enumerate(items[done:], done))), jobs or _most(), _call, (function,)).results():
         found[k] = answer
         while done in found:

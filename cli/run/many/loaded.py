@@ -253,12 +253,15 @@ class Loaded:
             plain = key if isinstance(key, str) else str(key[0])
             parameter = known.get(plain)
             number = value
+            # an array for a name that is none
             if parameter is None and np.ndim(value):
                 raise ModelError([Diagnostic("E405", f"there is no parameter '{plain}'", None)])
+            # a text with units, as on the command line
             if isinstance(value, str) and parameter is not None:
                 silent = Report()
                 with ex.fresh():
                     number = load.constant(self.target.document, value, parameter.unit.dimension, name, silent)
+            # names of levels and inputs, and sizes: the text is read again with them
             if parameter is None or number is None or isinstance(number, str) or plain in self.sizes:
                 texts.append((name, text_of(value)))
             else:

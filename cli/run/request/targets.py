@@ -52,11 +52,13 @@ def files(given: Iterable[str]) -> list[str]:
     found: dict[str, None] = {}
     for name in given:
         path = Path(name)
+        # all models below a folder, hidden ones left out
         if name != "-" and path.is_dir():
             inside = [p for p in sorted(path.rglob("*.sd")) if not _hidden(p.relative_to(path))]
             if not inside:
                 raise UsageError(f"there is no .sd file in the folder {name}")
             found |= dict.fromkeys(map(str, inside))
+        # a pattern that the shell did not expand
         elif any(sign in name for sign in "*?[") and not path.exists():
             fitting = sorted(glob.glob(name, recursive=True))  # noqa: PTH207 (a pattern may be absolute)
             if not fitting:
@@ -88,6 +90,7 @@ def one(document: Document, path: str, model: str | None, scene: str | None, rep
 
     UsageError with the list where there are several and none is named.
     """
+    # the scene tells the model
     if scene is not None:
         found = document.scenes.get(scene)
         if found is None:
@@ -100,9 +103,11 @@ def one(document: Document, path: str, model: str | None, scene: str | None, rep
         return Target(document, owner, found)
     if model is not None and model not in document.models:
         raise _nothing(document, path, "model", model, list(document.models), report)
+    # the only scene, of the model that is named
     scenes = [s for s in document.scenes.values() if model is None or s.model.names == (model,)]
     if len(scenes) == 1:
         return one(document, path, model, scenes[0].name.name, report)
+    # several: the author says which
     if scenes:
         raise UsageError(f"{path} has several scenes: --scene {' | '.join(s.name.name for s in scenes)}")
     return whole(document, path, model, None, report)
@@ -130,10 +135,12 @@ def whole(document: Document, path: str, model: str | None, scene: str | None, r
 
     None where its text has errors; UsageError with the list where there are several models and none is named.
     """
+    # with its scene
     if scene is not None:
         return one(document, path, model, scene, report)
     if model is not None and model not in document.models:
         raise _nothing(document, path, "model", model, list(document.models), report)
+    # the only model
     names = [model] if model is not None else list(document.models)
     if len(names) == 1:
         return Target(document, document.models[names[0]], None)

@@ -69,26 +69,32 @@ def start(
 def _find_start(
     prepared: Prepared, t0: float, report: Report, redundancy: str | None, until: float | None
 ) -> Started | None:
+    """Find the consistent start and its structure, report what is wrong of it; None where there is none."""
     scene = prepared.network.scene
     policy = redundancy or (scene.redundancy if scene else None) or "error"
     system = System.of(describe(prepared.structure, prepared.arrays), prepared.carrier, "3")
+    # the start, then ranks and index there
     try:
         with np.errstate(all="ignore"):  # what overflows is seen as no number
             state = eventful_start(system, t0, plan(prepared, system), Budget(until))
             facts = structure(system, state)
             implicit = undetermined(system, state, facts)
+    # a function that is no number explains more than the residual
     except InconsistentStart as error:
         if error.kind != "nonfinite" or not _report_undefined(prepared, system, t0, report):
             _report_refusal(prepared, t0, error, report, until)
         return None
+    # laws that are too steep at the guesses
     except NotFiniteError:
         _steep(prepared, system, t0, report)
         return None
+    # the limit of time
     except SolverFailure:
         _late(prepared, "while the start is sought", "a higher limit, or guesses nearer to a start", report)
         return None
     _structural(prepared, system, state, facts if not implicit else replace(facts, undetermined=()), policy, report)
     _inertia(prepared, system, state, report)
+    # unknowns that the gammas leave open
     for name in implicit:
         place = next(
             (u.place for u in prepared.network.unknowns if u.name == name.partition("[")[0]), prepared.network.place
@@ -185,6 +191,8 @@ def _steep(prepared: Prepared, system: System, t0: float, report: Report) -> Non
 def _structural(
     prepared: Prepared, system: System, state: ConsistentState, facts: Structure, policy: str, report: Report
 ) -> None:
+    """Report a singular configuration (E512), redundant constraints (E509) and what is undetermined (E516)."""
+    # a rank that is larger nearby: a dead centre
     if facts.singular:
         near = facts.rank
         message = f"the initial configuration is singular: rank {near - facts.singular}, {near} nearby"
@@ -192,6 +200,7 @@ def _structural(
         message += f": {', '.join(c.name for c in lost)} depend on each other there" if lost else ""
         where = lost[-1].place if lost else prepared.network.place
         report.error("E512", message, where, help="move the guess off the dead centre")
+    # the author asked to drop or to keep them
     if facts.redundant and policy != "error":
         return
     if facts.redundant:
@@ -204,6 +213,7 @@ def _structural(
         plural = "s" if facts.redundant > 1 else ""
         message = f"{facts.redundant} redundant constraint{plural}: dependent group {group}"
         report.error("E509", message, where, related=beside)
+    # no index: something has neither inertia nor a law
     elif facts.index is None and facts.undetermined and not facts.singular:  # a singular one does not tell multipliers
         names = ", ".join(f"'{n}'" for n in facts.undetermined[:5])
         message, help_ = f"the equations do not determine {names}", "inertia, stiffness, dissipation or a constraint"
@@ -262,6 +272,7 @@ def _statics(prepared: Prepared, system: System, state: ConsistentState, facts: 
 
     Claims of a model hold in each of its scenes: where there is a Lagrangian formulation, that is counted.
     """
+    # claims are of the whole model, with what the scene left out
     if prepared.left_out and prepared.network.statics:
         written = as_written(prepared, state.t)
         if written is None:
@@ -270,10 +281,12 @@ def _statics(prepared: Prepared, system: System, state: ConsistentState, facts: 
             return
         prepared, (system, state, facts) = written[0], (written[1].system, written[1].state, written[1].facts)
     index = facts.index
+    # counted in Lagrange's form where there is one
     primal = _primal(prepared, state.t) if prepared.network.statics and _without_primal_rows(prepared) else None
     if primal is not None:
         prepared, (system, state, facts) = primal[0], (primal[1].system, primal[1].state, primal[1].facts)
     known = facts.counts | {"index": index}
+    # order and manifold are computed where somebody asks
     if any(n.data in ("static order", "static manifold") for c in prepared.network.statics for n in _names(c)):
         model = prepared.compiled.energies
         idle = {c.name for c in model.coordinates if not c.tangible} | {s.name for s in model.states if s.measured}
@@ -308,6 +321,7 @@ def _names(claim: Expectation) -> list[ex.Node]:
 
 
 def _static(prepared: Prepared, claim: Expectation, known: dict[str, int | None], report: Report) -> None:
+    """Judge one claim about counts: E909 where it fails, N608 where the count is not known."""
     missing = []
 
     def lookup(node: ex.Node) -> float:

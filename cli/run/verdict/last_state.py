@@ -129,6 +129,7 @@ class LastState:
         """
         found = [c for c in self.prepared.network.constraints if c.kind in ("phi", "psi") and not c.loops]
         names = [c.name for c in self.prepared.network.coordinates if not c.shape]
+        # arrays and large models are not judged
         if not 0 < len(found) <= MANY or not 0 < len(names) <= MANY:
             return []
 
@@ -136,6 +137,7 @@ class LastState:
             by = {"phi": [[ex.var(n, "q")] for n in names]}
             by["psi"] = [[ex.var(n, "q", order=1), ex.var(n, "f")] for n in names]
             rows = [[sum(self.value(derivative(c.expression, v), y) for v in vs) for vs in by[c.kind]] for c in found]
+            # normed gradients: their smallest singular value tells the distance from dependence
             j = np.array(rows)
             return np.asarray(j / np.maximum(np.linalg.norm(j, axis=1, keepdims=True), 1e-300))
 
@@ -147,6 +149,7 @@ class LastState:
         before = 1.0 if start is None else decomposed(gradients(start))[1][-1]
         if not least < LOST * before:
             return []
+        # the constraints that take part in the combination
         weights = np.abs(left[:, -1])
         return [c for c, w in zip(found, weights, strict=True) if w > 0.1 * weights.max()]
 
@@ -161,12 +164,14 @@ class LastState:
         """The energy, work or dynamic that drives an unknown the most; None where none is known to."""
         base = re.sub(r"\[.*", "", unknown.removesuffix("'"))
         network = self.prepared.network
+        # a state has its own dynamic
         for d in network.dynamics:
             if d.state.data[0] == base:
                 return d.place
         position = ex.var(base, "q")
         moves = (position, ex.var(base, "q", order=1), ex.var(base, "f"))
         found: list[tuple[float, Place]] = []
+        # the size of what each statement contributes
         for e in network.energies:
             if not e.loops:
                 found += [(abs(self.value(derivative(e.expression, v))), e.place) for v in moves]
