@@ -22,14 +22,17 @@ def choose(network: Network, wanted: str, place: Place | None) -> tuple[str, tup
     auto takes Hamilton's form where the author gave kinetic energies T(p), else Lagrange's.
     """
     co = [c for c in network.coordinates if c.complementary]
+    # both families in one model: no formulation has the unknowns of both
     if co and len(co) < len(network.coordinates):
         related = (Related(f"cocoordinate {co[0].name}", co[0].place),)
         message = "no formulation satisfies all statements: coordinates and cocoordinates in one model"
         return "lagrangian", (
             Diagnostic("E604", message, network.place, "one system is written in one family", related),
         )
+    # cocoordinates alone: the complementary formulations
     if co:
         return _complementary(network, wanted, place)
+    # coordinates, and a complementary formulation asked for: the network reflected, if it can be
     if wanted in COMPLEMENTARY:
         found = _of_efforts(network, wanted)
         network = as_transformers(network)

@@ -140,16 +140,20 @@ def _owners(form: DescriptorForm, parameters: Parameters) -> dict[str, Extents]:
 
 def _hull(name: str, places: tuple[tuple[tuple[Node, ...], Nest, Place], ...], parameters: Parameters) -> Extents:
     """The box around all rows of a label; a hole or a second row of one index is E805."""
+    # a label without indices: one row, `constraint c: ...`
     if not places[0][0]:
         if len(places) > 1:
             raise ModelError([Diagnostic("E805", f"constraint {name} is given twice", places[-1][2])])
         return ()
+    # the rows of every loop as places, one array an index
     found = [np.stack([np.rint(a) for a in over(nest, at, parameters.lookup)]) for at, nest, _ in places]
     everything = np.concatenate(found, axis=1).astype(np.int64)
+    # all loops are empty: `for i in 1..0`
     if everything.shape[1] == 0:
         return tuple((1, 0) for _ in places[0][0])
     box = tuple((int(row.min()), int(row.max())) for row in everything)
     counts = np.bincount(positions(box, list(everything)), minlength=int(np.prod([b - a + 1 for a, b in box])))
+    # each place of the box exactly once: 0 is a hole, 2 a second row
     wrong = int(np.argmax(counts != 1)) if np.any(counts != 1) else -1
     if wrong >= 0:
         at = np.unravel_index(wrong, [b - a + 1 for a, b in box])
@@ -274,8 +278,10 @@ def _integer(
     kind, name = slot[0], slot[1]
     if kind == "value":
         return whole_number(parameters, name)
+    # where a family's array is by itself
     if kind in ("origin", "stride"):
         return _origin(owners[name]) if kind == "origin" else _strides(owners[name])[slot[2]]
+    # the same within the vector of all, a parameter's or a family's
     if kind in ("array", "step"):
         box = parameters.boxes[name] if name in parameters.boxes else owners[_label(name)]
         return where[name] + _origin(box) if kind == "array" else _strides(box)[slot[2]]

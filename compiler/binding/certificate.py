@@ -141,14 +141,17 @@ class _Judge:
 
     def _judge_sign(self, name: str, law: Node, own: Node, place: Place) -> Finding:
         """A law and its own variable: e f >= 0?"""
+        # the sense of a dry friction stands in it: it opposes its own motion by its form
         if self._sliding(law):
             return Finding(name, "dissipates", "structure", "dry friction, against its own sliding", place)
         fixed = cache(self._parameter_value)
+        # a proof: law(f) >= 0 over f >= 0 and <= 0 over f <= 0, as R f
         above, below = (enclose_over(law, {own: r}, fixed) for r in ((0.0, np.inf), (-np.inf, 0.0)))
         if above[0] >= 0.0 and below[1] <= 0.0:
             none = above[1] == 0.0 and below[0] == 0.0
             said = "no effort" if none else "e f >= 0 over all values"
             return Finding(name, "conserves" if none else "dissipates", "intervals", said, place)
+        # no proof, as a product of unknowns: look at points over the decades
         largest = 0.0
         others = sorted((n for n in ex.variables(law) if n is not own), key=lambda n: n.number)
         for x in DECADES:
@@ -203,6 +206,7 @@ class _Judge:
         slopes = [derivative(content, v) for v in own]
         second = [[derivative(s, v) for v in own] for s in slopes]
         still = dict.fromkeys(own, ex.const(0.0))
+        # the second derivatives are numbers, as those of f^T R f / 2: eigenvalues decide
         if not any(ex.variables(n) for row in second for n in row):
             matrix = np.array([[self._parameter_value(n) for n in row] for row in second])
             flat = all(self._parameter_value(ex.substitute(s, still)) == 0.0 for s in slopes)
@@ -212,6 +216,7 @@ class _Judge:
                 return Finding(name, role, "structure", "its matrix is positive semidefinite", place)
             if flat:
                 return Finding(name, "active", "structure", f"its matrix has the eigenvalue {values[0]:.3g}", place)
+        # of other contents the power at random points
         power = ex.add(*(ex.mul(v, s) for v, s in zip(own, slopes, strict=True)))
         return self._sample_power(name, [power], place)
 
@@ -259,6 +264,7 @@ class _Judge:
         unknowns = [n for n in ex.variables(effort) if n.op == "var" and n.data[1] == "e"]
         flows = [n for n in ex.variables(rate) if n.op == "var"]
         closing = [c for c in network.constraints if c.kind == "gamma" and unknowns[0] in ex.variables(c.expression)]
+        # e in `gamma: e + R*f = 0`: solve for f, whose law in e has a sign
         if len(unknowns) == len(flows) == len(closing) == 1:
             gamma, own = closing[0].expression, unknowns[0]
             slope = derivative(gamma, flows[0])

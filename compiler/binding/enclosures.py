@@ -130,12 +130,14 @@ def _truth(node: Node, args: list[Bounds]) -> Bounds:
     if node.op in ("and", "or"):
         pick = np.minimum if node.op == "and" else np.maximum
         return pick.reduce([a[0] for a in args]), pick.reduce([a[1] for a in args])
+    # a relation: surely true where the intervals lie in order, surely false where in the other
     (low, high), (left, right) = args
     sure, never = {
         "<": (high < left, low >= right),
         "<=": (high <= left, low > right),
         ">": (low > right, high <= left),
         ">=": (low >= right, high < left),
+        # == is never sure, and != is its contrary
     }.get(node.data, (np.zeros_like(low, bool), (high < left) | (low > right)))
     if node.data == "!=":
         sure, never = never, sure
@@ -176,6 +178,7 @@ def _bounds_of_node(node: Node, args: list[Bounds], outlines: Mapping[str, Outli
 def enclose(root: Node, low: Array, high: Array, fixed: Values, outlines: Mapping[str, Outline]) -> Bounds:
     """Bounds of `root`, which depends on time alone, over the intervals low..high [s] [k]."""
     order = order_of((root,))
+    # a number or a formula of parameters: a point
     if not variables(root):
         value = np.broadcast_to(np.asarray(fixed([root])[0], dtype=float), low.shape)
         return value, value
@@ -186,6 +189,7 @@ def enclose(root: Node, low: Array, high: Array, fixed: Values, outlines: Mappin
         if node in points:
             value = np.broadcast_to(np.asarray(points[node], dtype=float), low.shape)
             found[node] = value, value
+        # time is the interval itself; everything else from its arguments
         elif node.op == "time":
             found[node] = low, high
         else:

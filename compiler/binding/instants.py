@@ -200,6 +200,7 @@ def _degree(roots: tuple[Node, ...]) -> int:
     for node in topological(roots):
         inside = [found[a] for a in node.args]
         most = max(inside, default=0)
+        # t is 1; 2 + 3*t and p*t are still affine; t*t, t^2 and sin(t) are not
         if node.op == "time":
             found[node] = 1
         elif node.op == "sum" or most == 0:

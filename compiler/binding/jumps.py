@@ -150,14 +150,17 @@ class _Jumping:
         points, label = self._points(POINTS), self._label(node)
         size = points[leaf].size
         which, line = np.repeat(np.arange(size), LINE.size), np.tile(LINE, size)
+        # each random point with the leaf moved along LINE: where the branch's label changes, an edge lies between
         labels = self._labels(label, points, which, leaf, line).reshape(size, LINE.size)
         point, place = np.nonzero(labels[:, 1:] != labels[:, :-1])
+        # more edges than need be looked at: a sample of them
         if point.size > EDGES * POINTS:
             take = np.sort(self._random.choice(point.size, EDGES * POINTS, replace=False))
             point, place = point[take], place[take]
         if not point.size:
             return False
         low, high, first = LINE[place], LINE[place + 1], labels[point, place]
+        # halve until low and high are adjacent doubles on the two sides
         for _ in range(_HALVINGS):
             middle = low + 0.5 * (high - low)
             inside = (middle > low) & (middle < high)

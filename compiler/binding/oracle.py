@@ -160,6 +160,7 @@ class Oracle:
         t, y, yd = point
         if node.op == "time":
             return t
+        # f, q, p or a rate: by its place in y or y'
         if node.op == "var":
             owner, kind, order = node.data
             family = self._families[owner, kind]
@@ -167,6 +168,7 @@ class Oracle:
             whole = [np.rint(a).astype(np.int64) for a in args]
             place = self.at[family] + (positions(box, whole) if box else 0)
             return (yd if order else y)[place]
+        # the constant of an integrated row, which no text gives
         if node.op == "param" and node.data in self._constants:
             label, values = self._constants[node.data]
             owners = {r.owner: self.binding.row_shapes[k] for k, r in enumerate(self.form.rows) if r.block == "phi"}

@@ -167,11 +167,13 @@ class SampledRows:
             return columns[node.data]
         if node.op == "time":
             return points.t[which]
+        # f, q, p or a rate: by its place in y or y' of the point
         if node.op == "var":
             owner, kind, order = node.data
             family = self._families[owner, kind]
             place = self.at[family] + self._position(self.binding.shapes[family], args)
             return (points.yd if order else points.y)[which, np.broadcast_to(place, which.shape)]
+        # the constant of an integrated row, which no text gives
         if node.op == "param" and node.data in self._constants:
             box, values = self._constants[node.data]
             return values[self._position(box, args)] if args else values[0]

@@ -98,6 +98,7 @@ class Algebra:
     def _one(self, part: Any, args: list[Node]) -> Node:
         """Node of a sympy object from those of its arguments."""
         sympy = self.sympy
+        # a symbol that stands for a node sympy did not look into
         if part in self._nodes:
             return self._nodes[part]
         if part.is_Number or part is sympy.pi:
@@ -106,10 +107,12 @@ class Algebra:
             return add(*args)
         if part.is_Mul:
             return product(1.0, ((1.0, a) for a in args))
+        # x^2 keeps its number as an exponent, a^b is a call
         if part.is_Pow:
             return product(1.0, ((float(part.exp), args[0]),)) if part.exp.is_Number else power(*args)
         if isinstance(part, sympy.exp):
             return call("exp", *args)
+        # sin, cos, ...: the functions that both know
         for ours, theirs in _NAMES.items():
             if isinstance(part, getattr(sympy, theirs)):
                 return call(ours, *args)

@@ -154,20 +154,25 @@ def sum_terms(algebra: Algebra, parts: Sequence[tuple[Nest, Node]], *, whole: bo
 def sides(block: str, terms: Sequence[Summed]) -> tuple[tuple[Summed, ...], tuple[Summed, ...]]:
     """The sides of a row "sum of terms = 0"."""
     leading = [_class(term.expression) for term in terms]
+    # constraints have everything on the right: 0 = ...
     if block in ("phi", "psi", "gamma"):
         return (), tuple(terms)
+    # p on the left, or f where it stands alone: f = p/m
     if block == "momentum":
         bare = ("var" in (t.expression.op, t.negated.expression.op) for t in terms)
         alone = any(k == "f" and own for k, own in zip(leading, bare, strict=True))
         kept = ["f"] if alone and "p" in leading else ["p"] if "p" in leading else ["f"]
+    # the balance of an element: p' = efforts, s' = power
     elif "p'" in leading or "s'" in leading:
         kept = ["p'", "s'"]
     else:
         kept = ["f'", "multiplier"]
     pairs = list(zip(terms, leading, strict=True))
     left = tuple(t for t, kind in pairs if kind in kept)
+    # multipliers last
     rest = sorted((pair for pair in pairs if pair[1] not in kept), key=lambda pair: pair[1] == "multiplier")
     right = tuple(t.negated for t, _ in rest)
+    # -p' = e reads p' = -e
     if left and _negative(left[0].expression):
         return tuple(t.negated for t in left), tuple(t.negated for t in right)
     return left, right

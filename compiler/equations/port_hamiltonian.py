@@ -341,6 +341,7 @@ class _View:
             k = self.at[own]
             column = {i: add(*parts) for (i, j), parts in self.skew.items() if j == k}
             found = [g for g in rows if own in variables(g)]
+            # two unknown efforts in one gamma: neither's law alone
             if len(found) != 1 or not column:
                 raise NoSuchEquations(f"no effort constraint is the law of {name} alone")
             gamma = substitute(found[0], self._explicit())
@@ -349,9 +350,11 @@ class _View:
             if others or {self._row(n) for n in slopes} != set(column):
                 raise NoSuchEquations(f"the effort constraint of {name} is no relation to its own flow")
             first = next(iter(slopes))
+            # the multiple of gamma in which the first flow has the coefficient of -B^T f
             factor = neg(div(column[self._row(first)], slopes[first]))
             if any(set(local_variables(s, m.rate)) for s in slopes.values()):
                 raise NoSuchEquations(f"the effort constraint of {name} is not linear in its flow")
+            # what is left without flows, R33 e, is divided by e
             still = {n: const(0.0) for n in local_variables(gamma, m.rate)}
             _add(self.loss, k, k, neg(div(mul(factor, substitute(gamma, still)), own)))
 

@@ -281,14 +281,17 @@ class _Lowering:
             moved = inside(name)
         self.assembly.add("dynamics", name, at, moved, var(name, m.conjugate, *at, order=1))
         held = var(name, m.conjugate, *at)
+        # 0 = dT/dp - f and its rate are given: nothing is added to them
         if name in self.model.solved:
             zero, rate = self.model.solved[name]
             self.assembly.add("momentum", name, at, nest, zero)
             self.assembly.add("momentum_rate", name, at, nest, rate)
             return
+        # p, to which the other terms of the row come
         if not given:
             self._momentum(name, at, nest, held)
             return
+        # -f where T(p) is given, p at the other elements
         self._momentum(name, at, moved, neg(var(name, m.rate, *at)))
         for rest in outside(family) if partly is not None else ():
             self._momentum(name, at, rest, held)

@@ -163,10 +163,13 @@ def _floats(model: EnergyModel, group: _Anchors) -> bool:
     along = _Along(model, m.coenergy, m.rate, group)
     rows = [row for row in model.rows if row.kind != "lambda"]
     terms = [*model.function(m.coenergy), *model.function(m.content), *(t for row in rows for t in row.terms)]
+    # kinetic coenergy, content or rows change when all flows of the group grow by one number
     if any(along.changes(t.expression, t.loops, m.rate) for t in terms):
         return False
+    # a phi reads one displacement by itself, as q - 1 = 0
     if any(along.changes(t.expression, t.loops, m.coordinate) for row in model.of_kind("phi") for t in row.terms):
         return False
+    # so does the work of an effort that is neither of q alone nor of entropies
     for work in model.works:
         read = {n.data[1:] for n in variables(work.effort) if n.op == "var"}
         if not read <= {(m.coordinate, 0), ("s", 0)} and along.changes(work.on, work.loops, m.coordinate):

@@ -121,6 +121,7 @@ class Parameters:
         """The values as the text gives them."""
         lookup = self.lookup_at_place(parameter.place)
         shape = extents(box)
+        # `m[i] = 2*i`: the formula at each index
         if parameter.indices:
             pairs = zip(parameter.indices, box, strict=False)  # indices that follow hold a list, or one value for all
             nest = tuple(Loop(name, const(first), const(last)) for name, (first, last) in pairs)
@@ -128,12 +129,14 @@ class Parameters:
             rest = int(np.prod(shape[len(parameter.indices) :]))
             values = np.broadcast_to(columns, (columns.shape[0], rest)).flatten()
         else:
+            # a list, or one number for all elements
             values = np.asarray([float(v) for v in evaluate(parameter.values, lookup)])
             if len(values) != int(np.prod(shape)):
                 if len(values) != 1:
                     text = f"'{parameter.name}' has {int(np.prod(shape))} elements, {len(values)} are given"
                     raise ModelError([Diagnostic("E805", text, parameter.place)])
                 values = np.repeat(values, int(np.prod(shape)))
+        # `inf` written in the text is E324; an overflow is told by what calculates
         said = (n.data for n in topological(parameter.values) if n.op == "const")
         if np.any(np.isinf(values)) and any(map(math.isinf, said)):
             text = f"parameter '{parameter.name}' is inf, which no parameter can be: a run calculates with it"

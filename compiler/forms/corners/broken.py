@@ -43,8 +43,10 @@ def broken(root: Node, tables: Mapping[str, Table], floors: Set[Node] = frozense
         args = tuple(done[a] for a in node.args)
         table = tables.get(node.data[0]) if node.op == "table" else None
         apart = table is not None and _can_be_broken(table, node)
+        # one argument: conditions on it
         if table is not None and apart:
             done[node] = _pieces(table, args[0], node.data[1], floors)
+        # a grid of straight pieces in few values
         elif table is not None and len(args) > 1 and len(table.values) <= MOST:
             done[node] = _spread(table, node, args)
         else:

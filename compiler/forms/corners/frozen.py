@@ -233,6 +233,7 @@ class _Freezer:
     def _weight(self, test: Node, held: bool) -> Node:
         """How much of a condition is true: 1 or 0, (1 + s)/2 of a relation that slides."""
         one = const(1.0)
+        # s in -1..1 makes a weight in 0..1: `and` is a product, `or` its complement's, `not` the complement
         if test.op == "and":
             return mul(*(self._weight(a, held) for a in test.args))
         if test.op == "or":
@@ -243,8 +244,10 @@ class _Freezer:
         sense = self.sense[k] if k >= 0 else None
         plain = conditional(self.done[test], one, const(0.0))
         found = watched_branches(test)
+        # a relation that cannot slide: 1 or 0
         if sense is None or found is None:
             return plain
+        # a relation that can: (1 + s)/2, the other way round where it is true below
         up = (found.above is YES) == (found.u in self.number)
         part = linear(0.5, ((0.5 if up else -0.5, sense),))
         return part if held else conditional(compare("==", self.branch[k], const(SLIDES)), part, plain)

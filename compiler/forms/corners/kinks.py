@@ -81,13 +81,16 @@ YES, NO = compare("==", const(0.0), const(0.0)), compare("!=", const(0.0), const
 
 def branches_of(node: Node) -> Sided | None:
     """The two branches of an operation; None of one without."""
+    # what changes at zero of its argument
     if node.op == "call" and node.data in ("abs", "sign", "step"):
         (x,) = node.args
         pairs = {"abs": (x, neg(x)), "sign": (const(1.0), const(-1.0)), "step": (const(1.0), const(0.0))}
         return Sided(x, *pairs[node.data])
+    # what changes where two arguments meet
     if node.op == "call" and node.data in ("max", "min"):
         a, b = node.args
         return Sided(sub(a, b), a, b) if node.data == "max" else Sided(sub(a, b), b, a)
+    # a relation: true on one side of left - right = 0
     if node.op == "cmp" and node.data in (">", ">=", "<", "<="):
         a, b = node.args
         return Sided(sub(a, b), YES, NO) if node.data[0] == ">" else Sided(sub(a, b), NO, YES)
@@ -183,6 +186,7 @@ def smoothness(root: Node, u: Node, known: dict[tuple[Node, ...], int | None] | 
     other names (one law of many devices).
     """
     above, below = _unlike(side(root, u, above=True), side(root, u, above=False))
+    # max(x, 0) - max(x, 0): the operations cancel
     if above is below:
         return SMOOTH
     known = {} if known is None else known

@@ -172,6 +172,7 @@ def _below(a: Node) -> Node | None:
     for c, n in terms:
         if not _moves(n):
             continue
+        # -5 sin(w) = 5 - 5 (1 + sin(w)): q takes |c| times the amplitude too; -w^2 is below 0 by itself
         amplitude = _amplitude(n)
         if amplitude is None and not (c < 0.0 and _even(n)):
             return None
