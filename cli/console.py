@@ -10,10 +10,10 @@ from collections.abc import Callable, Iterable, Sequence
 from typing import Any, TypeVar
 
 import click
-from sysdyn.cli.failures import OF_RUNS, SOLVER, USAGE, envelope, plain, shown, worst
+from sysdyn.cli.failures import OF_RUNS, SOLVER, USAGE, envelope, plain, printable_message, worst
 from sysdyn.cli.progress import RUN, ProgressLine
 from sysdyn.cli.streams import put
-from sysdyn.dsl.text.diagnostics import Diagnostic, Edit, ModelError, Report, shortened
+from sysdyn.dsl.text.diagnostics import Diagnostic, Edit, ModelError, Report, limit_findings
 
 WHEN = ("auto", "always", "never")
 ROUTINE = ("N501", "N601", "N602", "N603", "N604")
@@ -56,7 +56,7 @@ class Console:
     def say(self, message: str) -> None:
         """A message for the person at the terminal."""
         if not (self.quiet or self.as_json):
-            put(shown(message) + "\n", "stderr")
+            put(printable_message(message) + "\n", "stderr")
 
     def complain(self, message: str, code: int, found: dict[str, Any] | None = None) -> None:
         """A message with the exit code that it leads to; --quiet does not silence it.
@@ -65,12 +65,12 @@ class Console:
         """
         self._plain.append(plain(message, code) if found is None else {**found, "message": message})
         if not (self.as_json or self.format):
-            put(shown(f"sysdyn: {message}") + "\n", "stderr")
+            put(printable_message(f"sysdyn: {message}") + "\n", "stderr")
 
     def data(self, text: str, *, verbatim: bool = False) -> None:
         """Data that was asked for; verbatim: the user's own text, which may go to a file."""
         if not self.as_json and text:
-            text = text if verbatim and not sys.stdout.isatty() else shown(text)
+            text = text if verbatim and not sys.stdout.isatty() else printable_message(text)
             put(text if text.endswith("\n") else text + "\n")
 
     def results(self, text: str, *, verbatim: bool = False) -> None:
@@ -82,17 +82,21 @@ class Console:
 
     def finish(self, code: int = 0) -> int:
         """Show the findings; the exit code (1 where there are errors)."""
-        found = shortened(self.report.diagnostics)
+        found = limit_findings(self.report.diagnostics)
+        # an error in what was typed is a wrong usage, one in a file is not
         if self.report.failed:
             typed = any(d.severity == "error" and d.place and d.place.source.typed for d in self.report)
             code = worst((code or 1, USAGE if typed else 0))
+        # results that were held back until it was clear how it ends
         for text, verbatim in self._results if code else ():
             self.data(text, verbatim=verbatim)
+        # one object, whatever happened
         if self.as_json:
             diagnostics = [*(d.to_json() for d in found), *self._plain]
             if self.command == "check":
-                self.result["edits"] = [edited(k, d.edit) for k, d in enumerate(found) if d.edit is not None]
+                self.result["edits"] = [edit_to_json(k, d.edit) for k, d in enumerate(found) if d.edit is not None]
             put(json.dumps(finite(envelope(self.command, code, diagnostics, self.result)), allow_nan=False) + "\n")
+        # a form for other programs
         elif self.format is not None:
             kept = [d for d in found if d.severity == "error" or not (self.quiet or self._routine(d))]
             self.data(self.format(kept, self._plain), verbatim=True)
@@ -120,7 +124,7 @@ class Console:
             put(f"{errors} error{'s' * (errors > 1)}{self.summary}\n", "stderr")
 
 
-def edited(number: int, edit: Edit) -> dict[str, object]:
+def edit_to_json(number: int, edit: Edit) -> dict[str, object]:
     """A change of the text that mends a finding, by the finding's place in `diagnostics`; `--fix` makes the same."""
     (line, column), (end_line, end_column) = edit.place.start, edit.place.end
     place = {"file": edit.place.file, "line": line, "column": column, "end_line": end_line, "end_column": end_column}

@@ -61,18 +61,22 @@ def report_failure(error: BaseException, arguments: Sequence[str]) -> int:
 
 
 def _say(error: BaseException, code: int, message: str, arguments: Sequence[str]) -> None:
+    """Print what ended the command: as JSON where that was asked for, else a line for a reader."""
     if type(error).__name__ == "NoArgsIsHelpError":  # `sysdyn` alone: the message is the help
         print(message, file=sys.stderr)
         return
+    # also where the command line could not be read
     if "--json" in arguments or _asks_for_json(arguments):
         command = next((a for a in arguments if not a.startswith("-")), None)
         print(json.dumps(envelope(command, code, [plain(message, code)], {})))
+    # no error: the user ended it
     elif code == INTERRUPTED:
         print("interrupted", file=sys.stderr)
     else:
-        print(shown(f"sysdyn: {message}"), file=sys.stderr)
+        print(printable_message(f"sysdyn: {message}"), file=sys.stderr)
         if isinstance(error, click.UsageError) and error.ctx is not None:
             print(f"try '{error.ctx.command_path} --help'", file=sys.stderr)
+    # a traceback for those who look for the fault
     if code == FAULT and os.environ.get("SYSDYN_DEBUG"):
         traceback.print_exception(error)
 
@@ -85,27 +89,32 @@ def _asks_for_json(arguments: Sequence[str]) -> bool:
 
 def classify(error: BaseException) -> tuple[int, str]:
     """Exit code and message."""
-    if _interrupted(error):
+    if _is_interruption(error):
         return INTERRUPTED, "interrupted"
+    # wrong options
     if isinstance(error, click.UsageError):
         return USAGE, error.format_message()
     if isinstance(error, click.ClickException):
         return INPUT_OUTPUT, error.format_message()
+    # `| head`: no error
     if isinstance(error, BrokenPipeError):
         silence()
         return 0, "the reader of the output went away"
+    # files
     if isinstance(error, OSError):
         name = f"{error.filename}: " if error.filename else ""
         return INPUT_OUTPUT, f"{name}{error.strerror or error}"
+    # the run is too large for this machine
     if isinstance(error, MemoryError):
         return SOLVER, ": ".join(filter(None, ("there is no memory left", str(error))))
     if type(error).__name__ == "TraceError":
         return INPUT_OUTPUT, str(error)
+    # anything else is ours
     how = f"{_where(error)}SYSDYN_DEBUG=1 shows the way there; please report it with the model"
     return FAULT, f"a fault in sysdyn: {type(error).__name__}: {error} ({how})"
 
 
-def _interrupted(error: BaseException | None) -> bool:
+def _is_interruption(error: BaseException | None) -> bool:
     """By Ctrl-C, which Python wraps into an error of its own where it falls into the making of a class."""
     while error is not None:
         if isinstance(error, (KeyboardInterrupt, click.Abort)):
@@ -120,7 +129,7 @@ def _where(error: BaseException) -> str:
     return f"{Path(frames[-1].filename).name}:{frames[-1].lineno}; " if frames else ""
 
 
-def shown(message: str) -> str:
+def printable_message(message: str) -> str:
     """A message for a terminal: names of files, models and data sets may hold control characters."""
     from sysdyn.dsl.text.render import printable
 

@@ -165,9 +165,9 @@ def _defaults(given: Sequence[str]) -> dict[str, Any]:
     """What the project's configuration says, for a command that runs."""
     if not given or given[0] not in COMMANDS or not {"-h", "--help"}.isdisjoint(given):
         return {}
-    from sysdyn.cli.project.config import configured
+    from sysdyn.cli.project.config import project_defaults
 
-    return configured(given, COMMANDS)
+    return project_defaults(given, COMMANDS)
 
 
 ONCE = 10.0
@@ -182,9 +182,11 @@ def _ended_like_an_interruption(last: bool) -> Iterator[None]:
     Those that somebody ignores (nohup) or handles already stay so.  last: nothing follows in this process but its exit,
     which a signal that comes late does not change.
     """
+    # signals can be set in the main thread alone
     mine = threading.current_thread() is threading.main_thread()
     names = ("SIGINT", "SIGTERM", "SIGHUP") if mine else ()  # Windows has no SIGHUP
     known = {number: signal.getsignal(number) for name in names if (number := getattr(signal, name, None)) is not None}
+    # handlers that nobody changed
     own = {
         s: h for s, h in known.items() if h is (signal.default_int_handler if s == signal.SIGINT else signal.SIG_DFL)
     }
@@ -197,7 +199,7 @@ def _ended_like_an_interruption(last: bool) -> Iterator[None]:
             until = time.monotonic() + ONCE
             raise KeyboardInterrupt
 
-    def told(lost: sys.UnraisableHookArgs) -> None:
+    def raise_again(lost: sys.UnraisableHookArgs) -> None:
         """Python drops what is raised where an object is taken apart: the interruption comes again, behind that."""
         nonlocal until
         interrupted = lost.exc_type is not None and issubclass(lost.exc_type, KeyboardInterrupt)
@@ -209,10 +211,11 @@ def _ended_like_an_interruption(last: bool) -> Iterator[None]:
 
     for number in own:
         signal.signal(number, heard)
-    sys.unraisablehook = told
+    sys.unraisablehook = raise_again
     try:
         yield
     finally:
         sys.unraisablehook = before
+        # as before, or nothing more where the process ends
         for number, handler in own.items():
             signal.signal(number, signal.SIG_IGN if last else handler)

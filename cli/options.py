@@ -43,7 +43,7 @@ class Setting(click.ParamType):  # type: ignore[type-arg]  # generic since click
         return name.strip(), text.strip()
 
 
-def offered(context: click.Context, parameter: click.Parameter, begun: str) -> list[CompletionItem]:
+def complete_for_shell(context: click.Context, parameter: click.Parameter, begun: str) -> list[CompletionItem]:
     """What a shell completes; imported only when a shell asks."""
     complete: Callable[..., list[CompletionItem]] = importlib.import_module("sysdyn.cli.completion").complete
     return complete(context, parameter, begun)
@@ -60,8 +60,8 @@ def _together(*options: Decorator) -> Decorator:
     return decorate
 
 
-_named = partial(click.option, metavar="NAME", shell_complete=offered)
-_set = partial(click.option, type=Setting(), multiple=True, shell_complete=offered)
+_named = partial(click.option, metavar="NAME", shell_complete=complete_for_shell)
+_set = partial(click.option, type=Setting(), multiple=True, shell_complete=complete_for_shell)
 _number = partial(click.option, type=float)
 _SIDE_BY_SIDE = "Processes side by side. Default: one a core, where the work pays for them."
 side_by_side = click.option("--jobs", "-j", type=click.IntRange(min=1), metavar="N", help=_SIDE_BY_SIDE)

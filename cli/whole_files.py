@@ -12,7 +12,7 @@ from sysdyn.cli.streams import put
 
 
 @contextlib.contextmanager
-def named(path: str | Path) -> Iterator[None]:
+def naming_file(path: str | Path) -> Iterator[None]:
     """An OSError within names the file."""
     try:
         yield
@@ -29,7 +29,7 @@ def write(path: str | Path, data: str | bytes) -> None:
         put(data)
         return
     content = data.encode("utf-8") if isinstance(data, str) else data
-    with named(path):
+    with naming_file(path):
         if Path(path).exists() and not Path(path).is_file():  # a device, a pipe, a folder
             Path(path).write_bytes(content)
             return
@@ -43,7 +43,7 @@ def write(path: str | Path, data: str | bytes) -> None:
 def replace(target: Path, data: str | bytes) -> None:
     """Beside the file, then renamed, or not at all: it is never half written.  OSError names the file."""
     part = target.with_name(f".{os.urandom(8).hex()}.part")
-    with named(target):
+    with naming_file(target):
         try:
             with part.open("xb") as stream:
                 stream.write(data.encode("utf-8") if isinstance(data, str) else data)

@@ -22,14 +22,17 @@ def choose(network: Network, wanted: str, place: Place | None) -> tuple[str, tup
     auto takes Hamilton's form where the author gave kinetic energies T(p), else Lagrange's.
     """
     co = [c for c in network.coordinates if c.complementary]
+    # both families in one model: no formulation has the unknowns of both
     if co and len(co) < len(network.coordinates):
         related = (Related(f"cocoordinate {co[0].name}", co[0].place),)
         message = "no formulation satisfies all statements: coordinates and cocoordinates in one model"
         return "lagrangian", (
             Diagnostic("E604", message, network.place, "one system is written in one family", related),
         )
+    # cocoordinates alone: the complementary formulations
     if co:
         return _complementary(network, wanted, place)
+    # coordinates, and a complementary formulation asked for: the network reflected, if it can be
     if wanted in COMPLEMENTARY:
         found = _of_efforts(network, wanted)
         network = as_transformers(network)
@@ -74,18 +77,21 @@ def _unknowns(node: Node, kind: str) -> list[Node]:
 def _obstacle(network: Network, wanted: str, place: Place | None) -> Diagnostic | None:
     """The first statement that keeps a model with `coord` out of the complementary family."""
     help_ = "formulation lagrangian, hamiltonian"
+    # inertia that depends on displacements has no complementary form
     for energy in network.energies:
         rates = _unknowns(energy.expression, "f") + _unknowns(energy.expression, "p")
         displacements = _unknowns(energy.expression, "q")
         if energy.function in ("T*", "T") and rates and displacements:
             message = f"not expressible in {wanted}: {energy.function} depends on displacement {displacements[0]}"
             return Diagnostic("E601", f"{message} and on {rates[0]}", energy.place, help_)
+    # a constraint of displacements ties momenta to nothing
     for constraint in network.constraints:
         displacements = _unknowns(constraint.expression, "q")
         if displacements:
             label = f"{constraint.kind} {constraint.name}"
             message = f"not expressible in {wanted}: {label} depends on displacement {displacements[0]}"
             return Diagnostic("E602", message, constraint.place, help_)
+    # nodes and elements have both families
     if not network.coordinates:
         return None
     first = network.coordinates[0]

@@ -29,21 +29,21 @@ from sysdyn.compiler.forms.hamiltonian import hamiltonian
 from sysdyn.compiler.forms.integration import integrate
 from sysdyn.compiler.forms.kane import kane
 from sysdyn.compiler.forms.lagrangian import lagrangian
-from sysdyn.compiler.forms.legendre import transformed
+from sysdyn.compiler.forms.legendre import legendre_transform
 from sysdyn.compiler.forms.meters.untraced import with_coordinates_observed
 from sysdyn.compiler.forms.relative_coordinates import in_relative_coordinates, without_ignorable
 from sysdyn.compiler.forms.series_stores import with_efforts_of_stores
-from sysdyn.compiler.forms.steepness import scaled
+from sysdyn.compiler.forms.steepness import add_scale_blocks
 from sysdyn.compiler.model import energies
 from sysdyn.compiler.model.energies import EnergyModel
 from sysdyn.compiler.model.mirror import refusal, word
 from sysdyn.compiler.network.along import along
-from sysdyn.compiler.network.authors import shown, told
-from sysdyn.compiler.network.gathered import gathered
+from sysdyn.compiler.network.authors import in_author_names, split_finding
+from sysdyn.compiler.network.gathered import gather_families
 from sysdyn.compiler.network.primal import Step, primal
 from sysdyn.compiler.network.primal.precedence import outermost
 from sysdyn.compiler.network.quadratures import with_momenta
-from sysdyn.compiler.network.reflection import reflect, relabelled
+from sysdyn.compiler.network.reflection import reflect, relabel
 from sysdyn.compiler.network.stated import FOREIGN, as_elements
 from sysdyn.compiler.network.verify import verify_network
 from sysdyn.compiler.program import build
@@ -103,7 +103,9 @@ class CompiledModel:
             return self._bound(overrides)
         except ModelError:
             if self.written is not None:  # at the author's places
-                _compiled(self.written, self.form.formulation, "numpy", integrating=True, traced=False).bind(overrides)
+                _compile_stages(self.written, self.form.formulation, "numpy", integrating=True, traced=False).bind(
+                    overrides
+                )
             raise
 
     def _bound(self, overrides: Overrides | None) -> Binding:
@@ -129,9 +131,9 @@ class CompiledModel:
         """The object of manifest.json."""
         return manifest.manifest(self.network, self.form, self.program, binding, index)
 
-    def lettered(self, network: Network) -> Network:
+    def in_author_letters(self, network: Network) -> Network:
         """A network of this model in the letters of the author's text."""
-        return relabelled(network) if self.form.formulation.startswith("co_") else network
+        return relabel(network) if self.form.formulation.startswith("co_") else network
 
     def structure(self) -> dict[str, Any]:
         """The manifest's `structure` alone."""
@@ -158,30 +160,37 @@ def compile_network(
     """
     try:
         with at_rest(), budget.drawn(network.place.source.text):
-            families = gathered(network, irregular=not formulation.startswith("co_")) if gather else network
+            families = gather_families(network, irregular=not formulation.startswith("co_")) if gather else network
             if families is not network:
+                # families of alike elements first, the text as it is where they fail
                 with suppress(ModelError):  # what is wrong is said of what the author wrote
-                    found = _compiled(families, formulation, backend, integrating=integrating, traced=traced)
-                    return _authored(found, network)
-            return _compiled(network, formulation, backend, integrating=integrating, traced=traced)
+                    found = _compile_stages(families, formulation, backend, integrating=integrating, traced=traced)
+                    return _restore_author_names(found, network)
+            return _compile_stages(network, formulation, backend, integrating=integrating, traced=traced)
     except (budget.SpentError, NoDerivativeError) as spent:
         raise ModelError([spent.diagnostic(network.place)]) from spent
 
 
-def _compiled(network: Network, formulation: str, backend: str, *, integrating: bool, traced: bool) -> CompiledModel:
+def _compile_stages(
+    network: Network, formulation: str, backend: str, *, integrating: bool, traced: bool
+) -> CompiledModel:
+    """Compile a network by all stages, each timed; ModelError where one of them refuses."""
     timings: list[Timing] = []
     reflected = formulation.startswith("co_")
-    with _timed("primal", timings):
+    # nodes and branches become coordinates
+    with _time_stage("primal", timings):
         network = along(outermost(network), complementary=reflected)
         family = reflect(network) if reflected else with_momenta(as_elements(network, FOREIGN))
         verify_network(family)
         network, inverted, steps = primal(family, reflected=reflected)
         verify_network(network, coordinates=True)
-    with _timed("energies", timings):
+    # the energy model: functions, works, rows
+    with _time_stage("energies", timings):
         model, cut = energies.energies(network), tuple[Diagnostic, ...]()
         if traced and not network.traced:
             model, cut = with_coordinates_observed(model, network)
         model = in_relative_coordinates(model)
+        # a run: what it reads, in coordinates that hide nothing
         if traced:
             model = with_efforts_of_stores(without_ignorable(model))
         energies.verify_energies(model)
@@ -190,29 +199,32 @@ def _compiled(network: Network, formulation: str, backend: str, *, integrating: 
         found = check_energies(model, network)
         if any(d.severity == "error" for d in found):
             raise ModelError(found)
-    with _timed("descriptor", timings):
+    # rows of the formulation
+    with _time_stage("descriptor", timings):
         legendre = formulation.endswith("hamiltonian")
-        own, rests = transformed(model, network.parameters) if legendre else (model, ())
+        own, rests = legendre_transform(model, network.parameters) if legendre else (model, ())
         network = replace(network, slopes=(*network.slopes, *rests))
-        lowered = _lowered(own, formulation)
+        lowered = _lower(own, formulation)
         titles = tuple(replace(r, label=word(formulation, r.label)) if r.block == "audit" else r for r in lowered.rows)
         lowered = replace(lowered, formulation=formulation, rows=titles)
         form, branches, many = with_book_signs(lowered), tuple[Parameter, ...](), tuple[Diagnostic, ...]()
+        # corners frozen by pieces, for events
         if traced:
             form, branches, many = frozen(form, network)
         network = replace(network, parameters=(*network.parameters, *branches))
-        form = scaled(form)
+        form = add_scale_blocks(form)
         descriptor.verify_descriptor(form)
-    with _timed("program", timings):
+    # operations in the order of their values
+    with _time_stage("program", timings):
         program = program_.program(form, tuple(p.name for p in network.parameters if not p.shape))
         verify_program(program)
-    with _timed("emit", timings):
+    with _time_stage("emit", timings):
         text = emit_c(program, form) if backend == "c" else emit_numpy(program, form)
     said = (*inverted, *notes, *cut, *found, *many)
     return CompiledModel(family, network, model, own, form, program, backend, text, said, steps, tuple(timings))
 
 
-def _lowered(model: EnergyModel, formulation: str) -> DescriptorForm:
+def _lower(model: EnergyModel, formulation: str) -> DescriptorForm:
     """The rows of a formulation; ModelError in its own name where they cannot be."""
     try:
         return FORMULATIONS[formulation.removeprefix("co_")](model)
@@ -223,16 +235,16 @@ def _lowered(model: EnergyModel, formulation: str) -> DescriptorForm:
         raise ModelError(told_) from refused
 
 
-def _authored(found: CompiledModel, written: Network) -> CompiledModel:
+def _restore_author_names(found: CompiledModel, written: Network) -> CompiledModel:
     """What is said of gathered families in the words of the network as it was written."""
     own = found.network.authors
-    notes = tuple(n for note in found.notes for n in told(note, own))
-    steps = tuple(Step(s.rule, shown(s.what, own), shown(s.became, own)) for s in found.steps)
+    notes = tuple(n for note in found.notes for n in split_finding(note, own))
+    steps = tuple(Step(s.rule, in_author_names(s.what, own), in_author_names(s.became, own)) for s in found.steps)
     return replace(found, notes=notes, steps=steps, written=written)
 
 
 @contextmanager
-def _timed(stage: str, timings: list[Timing]) -> Iterator[None]:
+def _time_stage(stage: str, timings: list[Timing]) -> Iterator[None]:
     wall, cpu = time.perf_counter(), time.process_time()
     yield
     timings.append(Timing(stage, time.perf_counter() - wall, time.process_time() - cpu))

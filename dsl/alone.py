@@ -12,7 +12,7 @@ from __future__ import annotations
 from collections.abc import Collection, Iterable, Iterator, Sequence
 from dataclasses import replace
 
-from sysdyn.dsl.elaborate.parts import declared
+from sysdyn.dsl.elaborate.parts import declarations_of
 from sysdyn.dsl.load import Document, network
 from sysdyn.dsl.model import budget
 from sysdyn.dsl.model.expression import fresh
@@ -28,7 +28,7 @@ _SIZE = 3
 """Of arrays whose size a user gives."""
 
 
-def unused(file: syntax.File) -> list[syntax.Component]:
+def unused_components(file: syntax.File) -> list[syntax.Component]:
     """The components of a file that no model in it has inside, whichever level is chosen."""
     components = {item.name.name: item for item in file.items if isinstance(item, syntax.Component)}
     used, stack = set[str](), [item for item in file.items if isinstance(item, syntax.Model)]
@@ -44,16 +44,16 @@ def unused(file: syntax.File) -> list[syntax.Component]:
     return [component for name, component in components.items() if name not in used]
 
 
-def judged(document: Document) -> Iterator[tuple[str, Report]]:
+def check_unused_components(document: Document) -> Iterator[tuple[str, Report]]:
     """Of each such component of a file: its name, and what is wrong with it and with what stands outside of all models
     and components.
     """
     with budget.drawn(document.file.source.text):  # one for all of them: each may have the others inside
-        for part in unused(document.file):
+        for part in unused_components(document.file):
             report = Report()
             try:
                 budget.unfold(budget.NODE * len(document.file.items), "components that no model uses")  # each reads all
-                report = _judged(document, part)
+                report = _check_component(document, part)
             except budget.SpentError as spent:
                 report.add(spent.diagnostic(Place(document.file.source, part.name.span)))
             yield part.name.name, report
@@ -61,7 +61,7 @@ def judged(document: Document) -> Iterator[tuple[str, Report]]:
                 return
 
 
-def _judged(document: Document, component: syntax.Component) -> Report:
+def _check_component(document: Document, component: syntax.Component) -> Report:
     report, source = Report(), document.file.source
     whole = [i for i in document.file.items if isinstance(i, (syntax.Component, syntax.Model, syntax.Scene))]
     others = [item.span for item in whole if item is not component]
@@ -102,17 +102,17 @@ def _inside(level: syntax.Level, levels: Iterable[syntax.Level]) -> Iterator[syn
 def _model(component: syntax.Component, said: Sequence[syntax.Statement], level: tuple[str, ...]) -> syntax.Model:
     """A model of one instance of a component."""
     ports = [s for s in said if isinstance(s, (syntax.Port, syntax.Branch, syntax.Input))]
-    sizes = {n.name for s in said for n in _below(bound for d in declared(s) for bound in d.indices)}
-    if any(d.indices for s in ports for d in declared(s)):  # of a size that the component says
+    sizes = {n.name for s in said for n in _below(bound for d in declarations_of(s) for bound in d.indices)}
+    if any(d.indices for s in ports for d in declarations_of(s)):  # of a size that the component says
         around, args = _parameters(said, sizes, every=True)
     else:
         around, args = _parameters(said, sizes)
     span, connections = component.span, list[syntax.Connection]()
     for port in ports:
-        node, ends = _around(port)
+        node, ends = _surroundings(port)
         around.append(node)
         connections += ends
-    label, taken = component.name.name, {d.name for s in around for d in declared(s)}
+    label, taken = component.name.name, {d.name for s in around for d in declarations_of(s)}
     while label in taken:
         label += "_"
     kind = syntax.Dotted((component.name.name, *level), component.name.span)
@@ -133,7 +133,7 @@ def _parameters(
     return found, [syntax.Arg(s.decl.name, _name(s.decl), s.decl.span) for s in own]
 
 
-def _around(port: _Port) -> tuple[syntax.Statement, list[syntax.Connection]]:
+def _surroundings(port: _Port) -> tuple[syntax.Statement, list[syntax.Connection]]:
     """What stands at a port, the branches of a statement, or an input, and how it is connected."""
     match port:
         case syntax.Input():

@@ -9,7 +9,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from sysdyn.dsl.elaborate.authors import told
+from sysdyn.dsl.elaborate.authors import point_at_author
 from sysdyn.dsl.elaborate.elaborate import Elaborator
 from sysdyn.dsl.elaborate.files import FileScope
 from sysdyn.dsl.elaborate.scenes import stopping
@@ -119,17 +119,18 @@ def network(
     """
     try:
         with deep(), at_rest(), budget.drawn(document.file.source.text):
-            elaborator, reader = _elaborated(document, model, scene, report, settings, levels, moved)
+            elaborator, reader = _elaborate(document, model, scene, report, settings, levels, moved)
             try:
-                return _judged(elaborator, reader, scene, report, required=required, outputs=outputs)
+                return _build_network(elaborator, reader, scene, report, required=required, outputs=outputs)
             finally:
-                report.retold(lambda found: told(elaborator, found))
+                report.retold(lambda found: point_at_author(elaborator, found))
+    # a text that unfolds into more than memory holds, or what has no derivative: one finding at the model
     except (budget.SpentError, NoDerivativeError) as spent:
         report.add(spent.diagnostic(Place(document.file.source, model.name.span)))
         return None
 
 
-def _judged(
+def _build_network(
     elaborator: Elaborator,
     reader: SceneReader,
     scene: syntax.Scene | None,
@@ -140,6 +141,7 @@ def _judged(
 ) -> Network | None:
     """The network of an elaborated model, after every check."""
     read_scene: Scene | None = None
+    # what the scene observes, then what the command line asks for in its place
     if scene is not None:
         read_scene = reader.read(scene, Place(elaborator.source, scene.name.span))
     if outputs is not None:
@@ -147,26 +149,30 @@ def _judged(
             reader.command(source, trace, SceneReader.trace)
     if _unread(elaborator, scene):
         return None  # what is missing would be found missing again, in other words
-    stopping.watched(elaborator, reader.observations)
+    # states that the text does not name: ranges of tables, integrals that are read, rates along expressions
+    stopping.watch_tables(elaborator, reader.observations)
     elaborator.quadratures()
-    elaborator.derived()
+    elaborator.add_derivatives()
+    # rules that need no numbers
     checks.run(elaborator, report, required=required)
     checks.set_valued_results(elaborator, reader.observations, report)
     exact_claims(elaborator, report)
     _begin(elaborator, read_scene)
+    # from here with the numbers of parameters: events of arrays one by one, sizes, the graph
     known = Values(elaborator.parts.parameters, reader.elements)
     if not report.failed and not _incomplete(report):
-        switches.expanded(elaborator, known)
+        switches.expand_events(elaborator, known)
     bound_values.run(elaborator, known, report, reader.observations)
     if not report.failed and not _incomplete(report):
         graph_checks.run(elaborator, known, nodes_read(elaborator.parts), report)
         floating(elaborator, reader.observations, report)
+    # laws are judged on the finished network, in which alike sizes have one name
     found = with_literal_ranges(with_common_sizes(_result(elaborator, reader, read_scene)), known.number)
     laws.run(found, known, report)
     return None if report.failed or _incomplete(report) else found
 
 
-def _elaborated(
+def _elaborate(
     document: Document,
     model: syntax.Model,
     scene: syntax.Scene | None,
@@ -179,22 +185,28 @@ def _elaborated(
     files = FileScope(document.file, report)
     elaborator = Elaborator(files, model, report)
     elaborator.moved = frozenset(moved)
+    # names of the model first: scene and command line refer to them
     elaborator.names()
     reader = SceneReader(elaborator)
     given = [s for name, value in settings for s in _set(name, value, report)]
+    # the levels that the scene chooses, before instances are made
     if scene is not None:
         reader.levels(scene)
     for source, statement in given:
         reader.command(source, statement, SceneReader.set_input)
+    # the command line wins over the scene
     for path, name in levels:
         text = SourceText("--level", f"{path}={name}")
         elaborator.levels[path] = (name, text.place(0, len(text.text)))
+    # components, with their nodes and branches
     elaborator.elements()
     _unused_levels(elaborator, report)
+    # values of parameters: the scene's, then the command line's
     if scene is not None:
         reader.settings(scene)
     for source, statement in given:
         reader.command(source, statement, SceneReader.set_parameter)
+    # laws and definitions, which read the values
     elaborator.settle()
     elaborator.statements()
     return elaborator, reader
@@ -208,11 +220,11 @@ def at_authors(network: Network, found: Iterable[Diagnostic]) -> tuple[Diagnosti
     again = document(source, Report())
     levels = [(choice.path, choice.chosen) for choice in network.levels]
     with deep(), budget.drawn(source.text), ex.fresh():
-        elaborator, _ = _elaborated(again, again.models[network.model], None, Report(), (), levels)
-        return tuple(told(elaborator, found))
+        elaborator, _ = _elaborate(again, again.models[network.model], None, Report(), (), levels)
+        return tuple(point_at_author(elaborator, found))
 
 
-def asked(
+def conditions_on_numbers(
     document: Document,
     model: syntax.Model,
     scene: syntax.Scene | None,
@@ -221,7 +233,7 @@ def asked(
 ) -> Asked:
     """What a text without errors asks of its numbers."""
     with deep(), budget.drawn(document.file.source.text):
-        elaborator, reader = _elaborated(document, model, scene, Report(), settings, levels)
+        elaborator, reader = _elaborate(document, model, scene, Report(), settings, levels)
         return Asked(elaborator, reader.elements)
 
 
@@ -237,7 +249,7 @@ def listing(
 
     try:
         with deep(), budget.drawn(document.file.source.text):
-            elaborator, reader = _elaborated(document, model, scene, report, (), levels)
+            elaborator, reader = _elaborate(document, model, scene, report, (), levels)
             if report.failed:
                 return None
             parameters = elaborator.parts.parameters
@@ -273,6 +285,7 @@ def _unused_levels(elaborator: Elaborator, report: Report) -> None:
 
 
 def _result(elaborator: Elaborator, reader: SceneReader, scene: Scene | None) -> Network:
+    """The network as frozen tuples, from what the elaborator and the scene's reader have gathered."""
     whole = elaborator.resolver.whole
     parts = elaborator.parts
     return Network(
@@ -326,6 +339,7 @@ def _incomplete(report: Report) -> bool:
 def constant(document: Document, text: str, dimension: Dimension, name: str, report: Report) -> float | None:
     """A constant expression of the command line in SI; a bare number is in SI units; None after reporting."""
     source = SourceText(name, f"const value = {text}\n")
+    # `--at ""`
     if not text.strip():
         report.error("E207", f"{name}: a value is missing", source.place(0, 0))
         return None
@@ -333,6 +347,7 @@ def constant(document: Document, text: str, dimension: Dimension, name: str, rep
     file, problems = parse(source)
     inner.extend(problems)
     items = [i for i in file.items if isinstance(i, syntax.Const)]
+    # a text that is no single expression, as `1; const b = 2`
     if inner.failed or "\n" in text or len(items) != 1 or len(file.items) != 1:
         unit = common(dimension) if dimension else ""
         report.extend(replace(d, help=f"one expression: 3 {unit}") if d.code == "E113" else d for d in inner)
@@ -343,9 +358,10 @@ def constant(document: Document, text: str, dimension: Dimension, name: str, rep
     resolver = Resolver(report)
     with deep(), ex.fresh(), resolver.space(_space(document, source)):
         try:
+            # a bare number is in SI units: `--at 3`
             if isinstance(value.operand if isinstance(value, syntax.Negative) else value, syntax.Number):
                 return resolver.scalar(value).node.data  # type: ignore[no-any-return]
-            node = resolver.wanted(value, dimension, "E208", f"{name} is in {{}}, wants {common(dimension)}")
+            node = resolver.scalar_of(value, dimension, "E208", f"{name} is in {{}}, wants {common(dimension)}")
         except Failed:
             return None
         found = Values({}).number(node)

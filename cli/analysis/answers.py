@@ -12,9 +12,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 from sysdyn.cli.analysis.asked import Found
-from sysdyn.cli.analysis.linear import Linear, linearised
+from sysdyn.cli.analysis.linear import Linear, linearise
 from sysdyn.cli.analysis.states import state_of
-from sysdyn.cli.page.columns import aligned, complex_text
+from sysdyn.cli.page.columns import align, complex_text
 from sysdyn.cli.run.request.asked import Request
 from sysdyn.dsl.model import expression as ex
 from sysdyn.dsl.model.units import si_text
@@ -64,6 +64,7 @@ def answers(linear: Linear) -> tuple[Answer, ...]:
 
 
 def _answer(linear: Linear, transfer: Transfer, low: float, high: float, end: float) -> Answer:
+    """Frequency response, margins and step response of one transfer function."""
     time, step = responses.step(linear.reduced, transfer, end)
     return Answer(
         linear.outputs[transfer.output],
@@ -97,14 +98,14 @@ def answer_to_text(answer: Answer, kinds: Sequence[str]) -> str:
     places = np.unique(np.linspace(0, f.w.size - 1, ROWS).round().astype(int))
     if "bode" in kinds:
         rows = [[f"{f.w[k]:.5g}", f"{f.magnitude[k]:.5g}", f"{f.phase[k]:.5g}"] for k in places]
-        parts += [aligned([["w [rad/s]", "magnitude [dB]", "phase [deg]"], *rows]), *_margins(answer.margins)]
+        parts += [align([["w [rad/s]", "magnitude [dB]", "phase [deg]"], *rows]), *_margins(answer.margins)]
     if "nyquist" in kinds:
         rows = [[f"{f.w[k]:.5g}", f"{f.value[k].real:.6g}", f"{f.value[k].imag:.6g}"] for k in places]
-        parts.append(aligned([["w [rad/s]", "Re", "Im"], *rows]))
+        parts.append(align([["w [rad/s]", "Re", "Im"], *rows]))
     if "step" in kinds:
         places = np.unique(np.linspace(0, answer.time.size - 1, ROWS).round().astype(int))
         rows = [[f"{answer.time[k]:.5g}", f"{answer.step[k]:.6g}"] for k in places]
-        parts.append(aligned([["t [s]", "step response"], *rows]))
+        parts.append(align([["t [s]", "step response"], *rows]))
     return "\n".join(parts)
 
 
@@ -132,6 +133,7 @@ def locus(request: Request, name: str, along: Sequence[float], *, rest: bool, fo
 
 
 def _eigenvalues(request: Request, name: str, value: float, *, rest: bool) -> tuple[NDArray[np.complex128] | None, str]:
+    """Eigenvalues where a parameter has another value, or why there are none."""
     settings = (*((n, v) for n, v in request.settings if n != name), (name, repr(value)))
     report = Report()
     with ex.fresh():
@@ -140,7 +142,7 @@ def _eigenvalues(request: Request, name: str, value: float, *, rest: bool) -> tu
             errors = [d.message for d in report.diagnostics if d.severity == "error"]
             return None, why or (errors[0] if errors else "no state")
         try:
-            return np.array([m.eigenvalue for m in linearised(at, ()).modes]), ""
+            return np.array([m.eigenvalue for m in linearise(at, ()).modes]), ""
         except NoLinearisation as error:
             return None, str(error)
 
@@ -169,6 +171,6 @@ def locus_to_text(found: Locus) -> str:
         shown = ", ".join(complex_text(v, 5) for v in sorted(here, key=lambda v: (-v.real, v.imag))[:4])
         most = f"{here.real.max():.6g}" if here.size else ""
         rows.append([f"{value:.6g}", most, f"{damping:.4g}", shown + (", ..." if here.size > 4 else "")])
-    lines = [aligned(rows)]
+    lines = [align(rows)]
     lines += [f"{found.parameter} = {value:.6g}: {why}" for value, why in found.failed]
     return "\n".join(lines)

@@ -16,10 +16,10 @@ from sysdyn.cli.run.request.asked import Request, options_of, rest, stops, turni
 from sysdyn.cli.run.request.targets import Target
 from sysdyn.cli.run.start.flat_laws import impossible
 from sysdyn.cli.run.start.starting import Started, start
-from sysdyn.cli.run.verdict.verdict import stopped
+from sysdyn.cli.run.verdict.verdict import report_stop
 from sysdyn.compiler.binding.binding import Binding
 from sysdyn.dsl import load
-from sysdyn.dsl.elaborate.scenes.stopping import unwatched
+from sysdyn.dsl.elaborate.scenes.stopping import drop_measuring_states
 from sysdyn.dsl.model import dimensions as dim
 from sysdyn.dsl.model.calculus import moving, rate_name, time_derivative
 from sysdyn.dsl.model.network import Network
@@ -50,7 +50,7 @@ class Found:
     started: Started | None = None
 
 
-def compiled(
+def compile_target(
     request: Request,
     report: Report,
     outputs: tuple[str, ...] | None = None,
@@ -64,11 +64,11 @@ def compiled(
     beside.  inputs: those that move in time, about what a formula gives them too.  choose: the target
     among those of the file.  None where the report says why not.
     """
-    target = targets.asked(request, report, choose)
+    target = targets.target_of(request, report, choose)
     if target is None:
         return None
     inner, unasked = Report(), frozenset[str]()
-    named = _named(target, inputs)
+    named = _input_names(target, inputs)
     read = partial(
         load.network,
         target.document,
@@ -78,31 +78,35 @@ def compiled(
         levels=request.levels,
         moved=named,
     )
+    # as the scene has it, or with the outputs that are asked for
     network = read(report=inner, outputs=outputs)
     prepared: Prepared | None = None
+    # inputs that move get rates, and what the caller wants observed is added
     if network is not None:
         moves = _moving(network, named)
         with moving(moves):
             asked = also(network) if also is not None else ()
+            # read again: more is observed, or formulas have a parameter added
             if asked or moves:
                 names = network.traced
                 unasked = frozenset(asked).difference(names)
                 more = (*names, *(name for name in asked if name not in names))
                 network = read(report=Report(), outputs=more) or network
-            network = replace(unwatched(network), statics=(), expectations=(), goldens=())
+            # no time passes here: states that measure and expectations are left out
+            network = replace(drop_measuring_states(network), statics=(), expectations=(), goldens=())
             network = _with_rates(network, moves)
             prepared = prepare(network, inner, formulation=request.formulation, backend=request.backend, gather=False)
-    report.extend(inner if prepared else targets.unsupported(inner))
+    report.extend(inner if prepared else targets.refuse_unsupported(inner))
     return None if prepared is None else (target, replace(prepared, unasked=unasked))
 
 
 def own_inputs(target: Target, network: Network) -> tuple[str, ...]:
     """The model's inputs that can be moved: all but arrays that follow formulas."""
     known = {p.name for p in network.parameters}
-    return tuple(name for name in _named(target, None) if name in known)
+    return tuple(name for name in _input_names(target, None) if name in known)
 
 
-def _named(target: Target, inputs: Inputs) -> tuple[str, ...]:
+def _input_names(target: Target, inputs: Inputs) -> tuple[str, ...]:
     """Names of the inputs asked for, without indices; the model's own where none is asked for."""
     if inputs is None:
         return tuple(s.decl.name for s in target.model.body if isinstance(s, syntax.Input))
@@ -150,7 +154,7 @@ def of_nodes(network: Network) -> tuple[str, ...]:
     return tuple(f"{n.name}.e" for n in nodes) if len(nodes) <= STORES else ()
 
 
-def begun(target: Target, prepared: Prepared, request: Request, report: Report) -> Found | None:
+def model_at_start(target: Target, prepared: Prepared, request: Request, report: Report) -> Found | None:
     """The model at its start; None where the report says what is in the way."""
     started = start(prepared, prepared.begin, report, request.redundancy)
     if started is None or report.failed:
@@ -158,22 +162,26 @@ def begun(target: Target, prepared: Prepared, request: Request, report: Report) 
     return Found(target, prepared, started.system, started.state, prepared.binding, started)
 
 
-def arrived(found: Found, request: Request, report: Report) -> tuple[Found | None, str | None]:
+def model_at_instant(found: Found, request: Request, report: Report) -> tuple[Found | None, str | None]:
     """The model at the instant `request.until`, and why its run did not come there (exit 3)."""
     asked = load.constant(found.target.document, request.until or "", dim.TIME, "--at", report)
     if asked is None:
         return None, None
+    # before the scene's start
     if asked < found.state.t:
         raise UsageError(f"--at {asked:g} s lies before the start, {found.state.t:g} s")
+    # the start itself
     if asked == found.state.t:
         return found, None
     options = options_of(request, found.target, found.prepared, report, time.monotonic(), None)
     if options is None:
         return None, None
+    # as `simulate` runs it, up to the instant
     options = replace(options, stops=stops(found.prepared, options, report))
     events = plan(found.prepared, found.system, rest=rest(options))
     options = replace(options, events=turning(events, found.prepared, options))
     assert found.started is not None
+    # the run may need a form that does not exist, an option that does not fit, or stop before
     try:
         system, state = arrival(found.system, found.state, found.started.facts, options)
     except NoSuchForm as error:
@@ -182,7 +190,7 @@ def arrived(found: Found, request: Request, report: Report) -> tuple[Found | Non
     except WrongOption as error:
         raise UsageError(str(error)) from error
     except SolverFailure as failure:
-        return None, stopped(found.target, found.prepared, found.started, failure, report)
+        return None, report_stop(found.target, found.prepared, found.started, failure, report)
     return replace(found, system=system, state=state, binding=_now(found.prepared, system)), None
 
 

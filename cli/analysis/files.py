@@ -58,7 +58,7 @@ def _hdf5(linear: Linear) -> bytes:
         for name, value in arrays(linear).items():
             file.create_dataset(name, data=_pairs(value), track_times=False)
         for name, texts in names(linear).items():
-            found = np.array([t.encode() for t in texts], dtype=_fixed(texts))
+            found = np.array([t.encode() for t in texts], dtype=_text_type(texts))
             file.create_dataset(name, data=found, track_times=False)
         for k, t in enumerate(linear.transfers):
             group = file.create_group(f"transfer/{k}")
@@ -73,7 +73,7 @@ def _hdf5(linear: Linear) -> bytes:
     return data.getvalue()
 
 
-def _fixed(texts: tuple[str, ...]) -> str:
+def _text_type(texts: tuple[str, ...]) -> str:
     return f"S{max((len(t.encode()) for t in texts), default=1) or 1}"
 
 
@@ -85,6 +85,7 @@ def _pairs(value: NDArray[Any]) -> NDArray[np.float64]:
 
 
 def _mat(linear: Linear) -> bytes:
+    """The linearisation as a MATLAB file of level 5, the same bytes each time."""
     from scipy.io import savemat
 
     found: dict[str, Any] = dict(arrays(linear))

@@ -77,16 +77,19 @@ def inputs_of(target: Target, prepared: Prepared, asked: Sequence[str] | None) -
     Raises UsageError.
     """
     known = {p.name: p for p in prepared.network.parameters}
+    # each element of the model's own inputs
     if asked is None:
         boxes = prepared.binding.parameters.boxes
         ranges_of = {n: [range(a, b + 1) for a, b in boxes.get(n, ())] for n in own_inputs(target, prepared.network)}
         return tuple((name, at) for name, ranges in ranges_of.items() for at in product(*ranges))
     own = [s.decl.name for s in target.model.body if isinstance(s, syntax.Input)]
     found: list[Input] = []
+    # `u`, `u[2]`, or a parameter
     for text in asked:
         match = _INPUT.fullmatch(text.strip())
         name = match[1] if match else text
         at = tuple(int(k) for k in match[2].split(",")) if match and match[2] else ()
+        # an array by a formula, something of an element, or nothing
         if name not in known:
             if name in own:
                 raise UsageError(f"input '{name}' is an array by a formula: --set {name}=[...] gives it numbers")
@@ -96,6 +99,7 @@ def inputs_of(target: Target, prepared: Prepared, asked: Sequence[str] | None) -
                 raise UsageError(f"--inputs: '{name}' is no parameter or input, but what an element gives: {how}")
             listed = f"nearest: '{near}'" if near else f"there are: {', '.join(known) or 'none'}"
             raise UsageError(f"--inputs: there is no parameter or input '{name}'; {listed}")
+        # the index lies in the array
         box = prepared.binding.parameters.boxes.get(name, ()) if known[name].shape else ()
         outside = [k for k, (first, last) in zip(at, box, strict=False) if not first <= k <= last]
         if len(at) != len(known[name].shape) or outside:
@@ -111,32 +115,38 @@ def loose_of(found: Found) -> NDArray[np.bool_]:
     return quadratures(found.system, tangible)
 
 
-def linearised(found: Found, inputs: Sequence[Input], index: str = "3", watched: Sequence[int] = ()) -> Linear:
+def linearise(found: Found, inputs: Sequence[Input], index: str = "3", watched: Sequence[int] = ()) -> Linear:
     """The linearisation at the state of `found`; watched: places of unknowns that are outputs too, the last ones.
 
     Raises NoLinearisation.
     """
     state, system = found.state, found.system
     rows = rows_at(system, state)
+    # of all rows by each input, up to its second rate
     slopes = [
         Sensitivity(found.prepared.compiled.form, found.binding, found.prepared.network, name, at)
         for name, at in inputs
     ]
     labels = tuple(name + (f"[{','.join(map(str, at))}]" if at else "") for name, at in inputs)
+    # an input whose third rate the hidden constraints read
     if deeper := [label for label, slope in zip(labels, slopes, strict=True) if slope.deeper]:
         raise NoLinearisation(f"the equations need a third rate of {', '.join(deeper)}")
-    names, out = _with(_outputs(found, slopes), system, watched)
+    names, out = _append_unknowns(_outputs(found, slopes), system, watched)
     by_input = tuple(
         _columns(rows.starter.settled.form, found, [(s, order) for s in slopes]) for order in range(FIRST, LAST + 1)
     )
     fixed = constant(system, state)
+    # at rest, or constant matrices: the pencil of the written form gives the same eigenvalues
     still = fixed or not moving(system, state)  # the pencil of the form as written is right too
     pencil = _descriptor(system, found, slopes, out, labels) if still else None
+    # on the constraint manifold, with the pencil as a witness
     small = witnessed(Given(rows, system, state, by_input, out, labels, loose_of(found)), pencil, fixed=fixed)
     own = modes(small.a, small.decomposed)
     stores, energies = _energies(found, small, own, names)
-    kept = _asked(found, names)
+    # outputs that were added for energies alone are not shown
+    kept = _requested_places(found, names)
     names, small, out = tuple(names[k] for k in kept), _rows(small, kept), _seen(out, kept)
+    # the matrices of the index form that was asked for
     form = system if index == "3" else system.another(index)
     descriptor = _descriptor(form, found, slopes, out, labels)
     pairs = ((i, j) for i in range(len(names)) for j in range(len(labels)))
@@ -151,7 +161,7 @@ def _units(network: Network) -> dict[str, str]:
     return inputs | {o.name: o.unit.text for o in network.observations}
 
 
-def _with(
+def _append_unknowns(
     seen: tuple[tuple[str, ...], Outputs], system: System, watched: Sequence[int]
 ) -> tuple[tuple[str, ...], Outputs]:
     """The outputs, and unknowns behind them."""
@@ -163,7 +173,7 @@ def _with(
     return (*names, *(system.name(int(k)) for k in watched)), Outputs(*both, (one, rate, twice))
 
 
-def _asked(found: Found, names: Sequence[str]) -> list[int]:
+def _requested_places(found: Found, names: Sequence[str]) -> list[int]:
     """Places of the outputs that were asked for, without what is observed of stores alone."""
     return [k for k, name in enumerate(names) if name not in found.prepared.unasked]
 
@@ -212,14 +222,17 @@ def _descriptor(
     """
     y, yd = found.state.for_form(form)
     jy, jyd = form.jacobian(found.state.t, y, yd)
+    # slopes of rows by integral, value, rate and second rate of each input
     by = {k: -_columns(form.form, found, [(s, k) for s in slopes]) for k in range(FIRST, LAST + 1)}
     there = {k: by[k].any(axis=0) for k in by}
+    # outputs may read rates of inputs too
     for k in (1, 2):
         there[k] = there[k] | out.by_input[k].any(axis=0)
     summed, valued, rated = (np.flatnonzero(m) for m in (there[FIRST], there[1] | there[2], there[2]))
     sizes = (form.unknowns, summed.size, valued.size, rated.size)
     at_y, at_s, at_v, at_w = np.split(np.arange(sum(sizes)), np.cumsum(sizes)[:-1])
     rows, unit = form.rows, np.eye(len(labels))
+    # rows of the form, then those of integrals, inputs and rates
     e, a = (np.zeros((rows + at_w.size + at_v.size + at_s.size, sum(sizes))) for _ in range(2))
     of_s, of_v, of_w = np.split(np.arange(rows, e.shape[0]), np.cumsum(sizes[1:])[:-1])
     e[:rows, at_y], e[:rows, at_v], e[:rows, at_w] = form.dense(jyd), -by[1][:, valued], -by[2][:, rated]
@@ -227,6 +240,7 @@ def _descriptor(
     e[of_s, at_s], a[of_v, at_v], a[of_w, at_w] = 1.0, -1.0, 1.0
     e[of_w, at_v[np.isin(valued, rated)]] = 1.0
     b = np.vstack([by[0], unit[summed], unit[valued], 0.0 * unit[rated]])
+    # outputs do not read these directly
     wide = np.zeros((out.by_y.shape[0], sum(sizes) - out.by_y.shape[1]))
     c, cd = (np.hstack([part, wide]) for part in (out.by_y, out.by_rate))
     cd[:, at_v], cd[:, at_w] = out.by_input[1][:, valued], out.by_input[2][:, rated]

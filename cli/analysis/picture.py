@@ -25,6 +25,7 @@ def picture(
     """kinds: of bode, nyquist, step, poles, locus; kind: png or svg."""
     found = found[:MOST]
     panels: list[Draw] = []
+    # a panel for each kind that has something to show
     if "bode" in kinds and found:
         panels += [lambda axis: _magnitude(axis, found), lambda axis: _phase(axis, found)]
     if "nyquist" in kinds and found:
@@ -38,6 +39,7 @@ def picture(
     columns = 1 if len(panels) == 1 else 2
     rows = max(-(-len(panels) // columns), 1)
 
+    # panels in two columns; a place that is left over is hidden
     def draw(figure: Any) -> None:
         axes = list(figure.subplots(rows, columns, squeeze=False).flat)
         for axis, panel in zip(axes, panels, strict=False):
@@ -104,9 +106,11 @@ def _drawable(values: Any) -> Any:
 
 
 def _nyquist(axis: Any, found: Sequence[Answer]) -> None:
+    """Curves of the frequency response in the complex plane, and the point -1 where it lies within."""
     limit = 0.0
     for k, answer in enumerate(found):
         value = answer.frequencies.value
+        # what grows beyond all others near a pole is cut off
         size = TALL * float(np.median(np.abs(value))) if value.size else 1.0
         kept = np.where(np.abs(value) <= size, value, np.nan)
         colour = COLOURS[k % len(COLOURS)]
@@ -131,6 +135,7 @@ def _title(found: Sequence[Answer]) -> str:
 
 
 def _poles(axis: Any, linear: Linear) -> None:
+    """Eigenvalues as crosses, zeros of the transfer functions as circles."""
     values = np.array([m.eigenvalue for m in linear.modes])
     axis.axvline(0.0, color="#9aa0a6", linewidth=0.8)
     axis.axhline(0.0, color="#9aa0a6", linewidth=0.8)
@@ -152,6 +157,7 @@ def _plane(axis: Any) -> None:
 
 
 def _locus(axis: Any, locus: Locus) -> None:
+    """Eigenvalues as curves over a parameter, both ends marked."""
     axis.axvline(0.0, color="#9aa0a6", linewidth=0.8)
     for k in range(locus.curves.shape[1]):
         curve = locus.curves[:, k]

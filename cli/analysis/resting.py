@@ -7,9 +7,9 @@ from dataclasses import field, replace
 from typing import Any
 
 import numpy as np
-from sysdyn.cli.analysis.asked import Found, compiled, of_nodes
-from sysdyn.cli.analysis.linear import linearised, loose_of
-from sysdyn.cli.analysis.states import at, resting
+from sysdyn.cli.analysis.asked import Found, compile_target, of_nodes
+from sysdyn.cli.analysis.linear import linearise, loose_of
+from sysdyn.cli.analysis.states import model_at_rest, resting
 from sysdyn.cli.page.columns import complex_text
 from sysdyn.cli.run.request.asked import Request
 from sysdyn.cli.run.request.targets import still
@@ -85,10 +85,12 @@ class Equilibrium:
         return "\n".join(lines)
 
     def _judgement(self) -> str:
+        """The verdict on stability in words, with the test that decided it."""
         if self.judged is None:
             return f"stability unknown: {self.why}"
         by = {"linearisation": "by the eigenvalues (Lyapunov's indirect method)", "energy": "by the energy test"}
         energy = self.judged.energy if self.judged.stability != "asymptotically stable" else None
+        # what the potential is there, where eigenvalues do not decide
         kind = (
             ""
             if energy is None
@@ -112,6 +114,7 @@ def equilibria(
     """
     began = 0.0
 
+    # the time that is left, by the time that the tried points took
     def advance(tried: int) -> None:
         """So many points of all; the time left by those that were tried."""
         nonlocal began
@@ -121,11 +124,16 @@ def equilibria(
             whole, spent = tried / (tries + 1), now - began
             progress(whole, spent * (1.0 - whole) / whole if spent > 1.0 else None)
 
-    made = compiled(request, report, (), of_nodes, (), still)
+    # compiled whole, with the efforts of nodes observed
+    made = compile_target(request, report, (), of_nodes, (), still)
     if made is None:
         return None
     found, states, why = resting(*made, tries, advance=advance)
-    return found, tuple(replace(_judged(found, rest), efforts=_efforts(at(found, rest))) for rest in states), why
+    return (
+        found,
+        tuple(replace(_equilibrium_of(found, rest), efforts=_efforts(model_at_rest(found, rest))) for rest in states),
+        why,
+    )
 
 
 def _efforts(here: Found) -> dict[str, tuple[float, Unit]]:
@@ -144,20 +152,23 @@ def _efforts(here: Found) -> dict[str, tuple[float, Unit]]:
     }
 
 
-def _judged(found: Found, rest: Rest) -> Equilibrium:
-    here = at(found, rest)
+def _equilibrium_of(found: Found, rest: Rest) -> Equilibrium:
+    """A state of rest with its unknowns by name, and the verdict on its stability or why there is none."""
+    here = model_at_rest(found, rest)
     system = here.system
     n = system.form.written
     names = dict(zip(system.unknown_names[:n], map(float, rest.state.y), strict=True))
     kinds = tuple(map(str, system.kinds[:n]))
     units = tuple(system.description.families[int(k)].unit for k in system.family_of[:n])
+    # a controller that acts at instants
     sampled = next((e.name for e in found.prepared.network.events if e.period is not None), None)
     if sampled is not None:
         return Equilibrium(rest, names, kinds, units, None, f"eigenvalues do not know what '{sampled}' does")
     try:
-        small = linearised(here, ()).reduced
+        small = linearise(here, ()).reduced
     except NoLinearisation as error:
         return Equilibrium(rest, names, kinds, units, None, str(error))
+    # the energy test needs a potential of displacements
     primal = found.prepared.formulation in ("lagrangian", "hamiltonian")
     with np.errstate(all="ignore"):
         energy = energy_at(system, rest.state) if primal else None

@@ -6,7 +6,7 @@ from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
-from sysdyn.cli.analysis.asked import Found, Inputs, arrived, begun, compiled, of_contents
+from sysdyn.cli.analysis.asked import Found, Inputs, compile_target, model_at_instant, model_at_start, of_contents
 from sysdyn.cli.run.events import plan
 from sysdyn.cli.run.prepare import Prepared
 from sysdyn.cli.run.request.asked import Request
@@ -35,14 +35,14 @@ def state_of(
     """The model at the state asked, its inputs free to move; else None, the report says why, and what stopped a run or
     a search.
     """
-    made = compiled(request, report, outputs, of_contents, inputs)
+    made = compile_target(request, report, outputs, of_contents, inputs)
     if made is None:
         return None, None
     if rest:
         found, states, why = resting(*made, TRIES, most=1)
         return (found, None) if states else (None, NO_REST.format("", found.state.t) + why)
-    found_ = begun(*made, request, report)
-    return (found_, None) if found_ is None or request.until is None else arrived(found_, request, report)
+    found_ = model_at_start(*made, request, report)
+    return (found_, None) if found_ is None or request.until is None else model_at_instant(found_, request, report)
 
 
 def resting(
@@ -60,12 +60,14 @@ def resting(
     events = plan(prepared, system)
     guess = _guess(system, t0, events)
     tangible = {c.name for c in prepared.compiled.energies.coordinates if c.tangible}
+    # every rate zero; contacts may hold or be open, sampled values stay as they are
     equations: Equations = Resting(system, tangible, t0, guess)
     if events.contacts:
         equations = ContactRest(system, tangible, t0, guess, events)
     if events.sampled:
         equations = SampledRest(equations, system, events.sampled)
     states = rests(equations, tries, most, advance)
+    # the guess where nothing was found
     state = states[0].state if states else ConsistentState(t0, guess, np.zeros_like(guess), (), np.inf)
     if states:
         states[0].stand(system)
@@ -74,7 +76,7 @@ def resting(
     return Found(target, prepared, system, state, prepared.binding), states, why
 
 
-def at(found: Found, rest: Rest) -> Found:
+def model_at_rest(found: Found, rest: Rest) -> Found:
     """The model at another state of rest."""
     rest.stand(found.system)
     return replace(found, state=rest.state)

@@ -15,11 +15,11 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from sysdyn.api.compiled import Module, by_name, compile_model, known, shown, written
+from sysdyn.api.compiled import Module, by_name, check_choices, compile_model, parameters_of_text, written
 from sysdyn.api.linear import Linearised, NoState, linearised_at, resting
 from sysdyn.cli.analysis.resting import Equilibrium
 from sysdyn.cli.failures import UsageError
-from sysdyn.cli.run.check.checking import checked
+from sysdyn.cli.run.check.checking import check_target
 from sysdyn.cli.run.many.loaded import Loaded, shortly, text_of
 from sysdyn.cli.run.request import targets
 from sysdyn.cli.run.request.asked import Request
@@ -75,26 +75,29 @@ def simulate(path: str | Path, *, unmet: str = "raise", **options: Any) -> Trace
     trace's file (a default as the command's); unmet: "warn" where a run that is not met shall warn instead of raising
     `NotMet`.  Returns the trace.
     """
-    _known(unmet)
+    _check_unmet(unmet)
     report = Report()
     ran = run(_request(path, options), report)
-    return _handed(ran, report, unmet)
+    return _trace_or_raise(ran, report, unmet)
 
 
-def _known(unmet: str) -> None:
+def _check_unmet(unmet: str) -> None:
     if not isinstance(unmet, str) or unmet not in ("raise", "warn"):
         raise UsageError(f"unmet {shortly(unmet)}: raise or warn")
 
 
-def _handed(ran: Ran | None, report: Report, unmet: str) -> Trace:
+def _trace_or_raise(ran: Ran | None, report: Report, unmet: str) -> Trace:
     """The trace of a run that came to its end, or what stopped it."""
+    # the text or the start is wrong
     if ran is None or ran.exit == 1:
         raise ModelError(report.diagnostics)
+    # the solver stopped
     if ran.outcome.failure is not None:
         raise ran.outcome.failure
     trace = ran.outcome.traced
     for text in ran.outcome.warnings:
         warnings.warn(text, stacklevel=3)
+    # ended, and not met: raised, or warned of
     if ran.outcome.judgement is not None and not ran.outcome.met:
         found = NotMet(trace, ran.outcome.judgement.not_met, report.diagnostics)
         if unmet == "raise":
@@ -112,7 +115,7 @@ class Model:
     def __init__(self, loaded: Loaded) -> None:
         self._loaded = loaded
         prepared = loaded.first.prepared
-        self.parameters = shown(prepared.binding.values)
+        self.parameters = parameters_of_text(prepared.binding.values)
         self.traced = prepared.network.traced
         self.formulation = prepared.formulation
 
@@ -133,15 +136,15 @@ class Model:
         options: `accuracy`, `rtol`, `atol`, `method`, `step`, `index`, `max_steps`, `max_wall`, `output` that
         differ from those of `load`.  Raises as `simulate` does.
         """
-        _known(unmet)
+        _check_unmet(unmet)
         if not options.keys() <= _RUN:
             raise UsageError(f"run() has no option {', '.join(sorted(options.keys() - _RUN))}: give it to load()")
         given = {name: value for name, value in {"until": until, "at": at, **options}.items() if value is not None}
         report, values = Report(), _settings({} if set is None else set)
         if given:
-            return _handed(self._loaded.run(values, report, alone=True, **_changes(given)), report, unmet)
+            return _trace_or_raise(self._loaded.run(values, report, alone=True, **_changes(given)), report, unmet)
         found = self._loaded.trace(values, report)
-        return found if isinstance(found, Trace) else _handed(found, report, unmet)
+        return found if isinstance(found, Trace) else _trace_or_raise(found, report, unmet)
 
     def sweep(
         self,
@@ -167,12 +170,15 @@ class Model:
         from sysdyn.cli.sweep.study import line, study
         from sysdyn.cli.sweep.sweeping import axes_of, sweep
 
+        # the model that is loaded, unless the end is another
         request = replace(self._loaded.request, output=None, **_changes({} if until is None else {"until": until}))
         runner = Runner(request, keep, loaded=self._loaded if until is None else None)
         axes = axes_of(runner, tuple(line(name, value) for name, value in by_name("over", over).items()))
+        # numbers as they are given, with errors that name them
         counts = {"runs": runs, "seed": seed, "jobs": jobs}
         counts = {name: n if n is None else int(_number(name, n, int)) for name, n in counts.items()}
         asked = study(axes, sample, counts["runs"], counts["seed"] or 0)
+        # in memory: a file that goes with the folder
         with tempfile.TemporaryDirectory(prefix="sysdyn-") as folder:
             file = Path(output) if output is not None else Path(folder) / "sweep.h5"
             sweep(request, asked, file, counts["jobs"] or 1, _silent, timings=True, keep=keep, dask=dask, runner=runner)
@@ -239,8 +245,8 @@ def check(text: str, name: str = "<text>") -> list[Diagnostic]:
     document = load_.document(SourceText(name, text), report)
     for target in targets.all_targets(document, report):
         with ex.fresh():
-            checked(target, report)
-    for _, own in alone.judged(document):
+            check_target(target, report)
+    for _, own in alone.check_unused_components(document):
         report.extend(own)
     return list(report.diagnostics)
 
@@ -251,7 +257,7 @@ def _request(path: object, options: dict[str, Any]) -> Request:
     settings = given.pop("set", given.pop("settings", None))
     settings = () if settings is None else settings
     given["settings"] = tuple((name, text_of(value)) for name, value in _settings(settings).items())
-    return _made(Request, path, **_changes(given))
+    return _make_request(Request, path, **_changes(given))
 
 
 def _settings(settings: Any) -> dict[str, Any]:
@@ -265,12 +271,12 @@ def _settings(settings: Any) -> dict[str, Any]:
     return found
 
 
-def _made(make: Any, *arguments: Any, **options: Any) -> Request:
+def _make_request(make: Any, *arguments: Any, **options: Any) -> Request:
     try:
         request: Request = make(*arguments, **options)
     except TypeError as error:
         raise UsageError(str(error).replace("Request.__init__()", "simulate()")) from None
-    known(request.formulation, request.backend, request.index)
+    check_choices(request.formulation, request.backend, request.index)
     return request
 
 
@@ -301,6 +307,7 @@ def _changes(options: dict[str, Any]) -> dict[str, Any]:
     given = dict(options)
     given |= {name: written(name, given[name]) for name in _TEXTS & given.keys() if given[name] is not None}
     level = given.pop("level", None)
+    # a mapping of paths to levels, or pairs
     if level is not None:
         pairs = (
             list(level.items())
@@ -312,15 +319,18 @@ def _changes(options: dict[str, Any]) -> dict[str, Any]:
         if any(not isinstance(p, tuple) or list(map(type, p)) != [str, str] for p in pairs):
             raise UsageError(f"level {shortly(level)}: paths with the names of their levels")
         given["levels"] = tuple(pairs)
+    # numbers are SI, texts have units
     for name in ("until", "max_wall", "step"):
         if given.get(name) is not None:
             given[name] = text_of(given[name])
+    # tolerances and counts
     for name, kind in _NUMBERS.items():
         if given.get(name) is not None:
             given[name] = _number(name, given[name], kind)
     at = given.get("at")
     if at is not None and not isinstance(at, str):
         given["at"] = ",".join(text_of(t) for t in _instants(at))
+    # names of the command line are understood too
     if "o" in given:
         given["output"] = given.pop("o")
     if "no_timings" in given:

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from sysdyn.cli.export.asked import formed_of, network_of, refused
+from sysdyn.cli.export.asked import formed_of, network_of, report_impossible
 from sysdyn.cli.export.files import manifest_of
 from sysdyn.cli.export.index_parameters import index_parameters
 from sysdyn.cli.export.layout import AUDIT, Formed, state_jacobian, tables
@@ -71,7 +71,7 @@ class Module:
         self.unknowns = elements(formed)
         self.traced = tuple(output.name for output in self._numbers.outputs)
         self.t0, self.y0, self.yd0 = self._numbers.t0, self._numbers.y0, self._numbers.yd0
-        self.parameters = shown(formed.prepared.binding.values)
+        self.parameters = parameters_of_text(formed.prepared.binding.values)
         pattern = self._numbers.state or self._numbers.system
         self.indptr, self.indices = pattern.column, pattern.row
         self._systems: dict[tuple[tuple[str, bytes], ...], System] = {(): formed.system}
@@ -97,7 +97,7 @@ class Module:
             self._systems[key] = made.without(system.left_out) if system.left_out else made
         return self._systems[key]
 
-    def _at(
+    def _prepare_point(
         self, t: float, parameters: Mapping[str, Any] | None, *given: NDArray[np.float64]
     ) -> tuple[float, System, Any, Any]:
         """t, the system with these parameters, y and ydot as it takes them.  ValueError: one has another shape."""
@@ -120,7 +120,7 @@ class Module:
         parameters: Mapping[str, Any] | None = None,
     ) -> NDArray[np.float64]:
         """F(t, y, ydot) [rows]; parameters: values that replace the model's."""
-        t, system, y, ydot = self._at(t, parameters, y, ydot)
+        t, system, y, ydot = self._prepare_point(t, parameters, y, ydot)
         if self._numbers.state is None:
             return system.residual(t, y, ydot)
         return np.asarray(ydot - self._slopes(system, t, y)[1][self._numbers.state.places])
@@ -134,7 +134,7 @@ class Module:
         parameters: Mapping[str, Any] | None = None,
     ) -> NDArray[np.float64]:
         """Entries of dF/dy + cj dF/dydot on the pattern: scipy.sparse.csc_array((values, indices, indptr))."""
-        t, system, y, ydot = self._at(t, parameters, y, ydot)
+        t, system, y, ydot = self._prepare_point(t, parameters, y, ydot)
         if self._numbers.state is not None:
             inside, rates = self._slopes(system, t, y)
             return state_jacobian(self._numbers, system, t, inside, rates, cj)
@@ -149,7 +149,7 @@ class Module:
         parameters: Mapping[str, Any] | None = None,
     ) -> NDArray[np.float64]:
         """Entries of dF/dydot on the pattern."""
-        t, system, y, ydot = self._at(t, parameters, y, ydot)
+        t, system, y, ydot = self._prepare_point(t, parameters, y, ydot)
         if self._numbers.state is not None:
             columns = np.repeat(np.arange(self.y0.size), np.diff(self.indptr))
             return np.asarray(self.indices == columns, dtype=float)
@@ -163,7 +163,7 @@ class Module:
         parameters: Mapping[str, Any] | None = None,
     ) -> NDArray[np.float64]:
         """What the scene traces at a point; not a number where it reads a ledger of a whole run."""
-        t, system, y, ydot = self._at(t, parameters, y, ydot)
+        t, system, y, ydot = self._prepare_point(t, parameters, y, ydot)
         if self._numbers.state is not None:
             y, ydot = self._slopes(system, t, y)
         kinetic, potential = system.audit(t, y, ydot)[:2]
@@ -209,24 +209,26 @@ def compile_model(
         written("formulation", formulation),
         written("backend", backend),
     )
-    known(formulation, backend, index)
+    check_choices(formulation, backend, index)
     scene, model = (name if name is None else written("scene or model", name) for name in (scene, model))
     report, request = Report(), Request(written("path", path), scene, model, backend=backend, no_prune=no_prune)
+    # nodes of the text go with it
     with ex.fresh():
         network = network_of(request, report)
         report.raise_if_failed()
         assert network is not None
+        # auto: by the statements of the model
         wanted = None if formulation == "auto" else formulation
         prepared = prepare(network, report, formulation=wanted, backend=backend, prune=not no_prune)
         if prepared is not None:
-            with refused(prepared, report):
+            with report_impossible(prepared, report):
                 formed = formed_of(prepared, None if index == "auto" else index, report)
                 if formed is not None:
                     return Module(formed)
     raise ModelError(report.diagnostics)
 
 
-def known(formulation: str | None, backend: str, index: str | None) -> None:
+def check_choices(formulation: str | None, backend: str, index: str | None) -> None:
     """UsageError where there is no such formulation, backend or index form."""
     given = {"formulation": (formulation, FORMULATIONS), "backend": (backend, BACKENDS), "index": (index, INDICES)}
     for what, (said, names) in given.items():
@@ -234,6 +236,6 @@ def known(formulation: str | None, backend: str, index: str | None) -> None:
             raise UsageError(f"{what} {said!r}: {', '.join(names[:-1])} or {names[-1]}")
 
 
-def shown(values: Mapping[str, Any]) -> dict[str, Any]:
+def parameters_of_text(values: Mapping[str, Any]) -> dict[str, Any]:
     """Parameters of the text: none that the compiler made."""
     return {name: value for name, value in values.items() if not name.startswith("#")}

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 from sysdyn.cli.analysis import linear as linear_
 from sysdyn.cli.analysis.answers import Answer, answers
 from sysdyn.cli.analysis.files import arrays
-from sysdyn.cli.analysis.linear import inputs_of, linearised
+from sysdyn.cli.analysis.linear import inputs_of, linearise
 from sysdyn.cli.analysis.resting import Equilibrium, equilibria
 from sysdyn.cli.analysis.states import state_of
 from sysdyn.cli.failures import UsageError
@@ -111,7 +111,7 @@ def linearised_at(
             if why:
                 raise NoState(why)
             raise ModelError(report.diagnostics)
-        return Linearised(linearised(found, inputs_of(found.target, found.prepared, inputs), request.index or "3"))
+        return Linearised(linearise(found, inputs_of(found.target, found.prepared, inputs), request.index or "3"))
 
 
 def resting(request: Request, tries: int) -> tuple[Equilibrium, ...]:

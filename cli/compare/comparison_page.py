@@ -12,7 +12,7 @@ from collections.abc import Sequence
 
 import numpy as np
 from sysdyn.cli.compare.diffing import headline, sentence
-from sysdyn.cli.page.curves import BOTTOM, COLUMNS, HEIGHT, LEFT, RIGHT, TOP, WIDTH, Frame, axes, framed, outline
+from sysdyn.cli.page.curves import BOTTOM, COLUMNS, HEIGHT, LEFT, RIGHT, TOP, WIDTH, Frame, axes, frame_around, outline
 from sysdyn.cli.page.document import document, table
 from sysdyn.cli.page.unit_text import conversion
 from sysdyn.runtime.comparison.curve import Curve, Floats, bernstein, cells_at
@@ -51,6 +51,7 @@ def section(ref: Source, test: Source, verdict: Verdict) -> str:
 
 
 def _table(verdict: Verdict) -> str:
+    """Rows of what differs and of all quantities, the worst instant of each."""
     heads = ("quantity", "verdict", "times the limit", "at [s]", "reference", "test", "limit", "unit")
     rows = []
     for c in (*(t for t in verdict.traces if not t.equal), *verdict.quantities):
@@ -74,12 +75,14 @@ def _pictures(ref: Source, test: Source, c: Compared, low: float, high: float) -
     """Reference with its tube and test over the span; their difference with the limit."""
     scale, offset = conversion(test.quantities[c.name].unit, c.unit) or (1.0, 0.0)
     seconds = (conversion(test.time_unit, ref.time_unit) or (1.0, 0.0))[0]
+    # both traces in units of the reference
     one = outline(ref, c.name, low, high)
     two = [(x, y * scale + offset) for x, y in outline(test, c.name, low, high, seconds)]
     limit = c.limit if math.isfinite(c.limit) else 0.0
-    frame = framed(low, high, [y + d for _, y in one for d in (-limit, limit)] + [y for _, y in two])
+    frame = frame_around(low, high, [y + d for _, y in one for d in (-limit, limit)] + [y for _, y in two])
     if frame is None:
         return []
+    # the reference plus and minus the limit
     tube = [frame.points(x, y + limit) + frame.points(x, y - limit)[::-1] for x, y in one]
     body = [f'<polygon class="tube" points="{" ".join(points)}"/>' for points in tube]
     for kind, pieces in (("ref", one), ("test", two)):
@@ -88,11 +91,12 @@ def _pictures(ref: Source, test: Source, c: Compared, low: float, high: float) -
     key += '<tspan dx="12" style="fill:var(--test)">test</tspan>'
     found = [_svg(frame, c, c.name, body, key, ref.time_unit)]
     x = np.unique(np.append(np.linspace(low, high, 4 * COLUMNS), c.worst.time if math.isfinite(c.worst.time) else low))
+    # the difference, at points of its own
     y = (_values(test, c.name, x, seconds) * scale + offset) - _values(ref, c.name, x, 1.0)
     x, y = x[np.isfinite(y)], y[np.isfinite(y)]
-    frame = framed(low, high, [y, np.array([-limit, limit])]) if y.size else None
+    frame = frame_around(low, high, [y, np.array([-limit, limit])]) if y.size else None
     if frame is not None:
-        upper, lower = frame.down(limit), frame.down(-limit)
+        upper, lower = frame.y_pixels(limit), frame.y_pixels(-limit)
         size = f'x="{LEFT}" y="{upper:.1f}" width="{WIDTH - LEFT - RIGHT}" height="{max(lower - upper, 0.5):.1f}"'
         body = [f'<rect class="tube" {size}/>', f'<polyline class="off" points="{" ".join(frame.points(x, y))}"/>']
         key = '<tspan style="fill:var(--ref)">limit</tspan>'

@@ -9,7 +9,7 @@ import tempfile
 from collections.abc import Iterator
 from typing import Any
 
-from sysdyn.cli.page.columns import aligned
+from sysdyn.cli.page.columns import align
 from sysdyn.cli.page.unit_text import conversion
 from sysdyn.runtime.comparison.compare import compare
 from sysdyn.runtime.comparison.curve import Floats
@@ -23,7 +23,7 @@ SHOWN = 20
 
 
 @contextlib.contextmanager
-def opened(file: str) -> Iterator[Recorded]:
+def open_trace(file: str) -> Iterator[Recorded]:
     """A trace of a file, or of standard input where it is '-'.  Raises TraceError, OSError, Incomparable."""
     if file != "-":
         regular(file)  # a plainer message than HDF5's where there is none
@@ -84,7 +84,7 @@ def headline(verdict: Verdict) -> str:
         return "equal"
     if verdict.equal:
         count = len(verdict.quantities)
-        where = f"nearest to its limit {worst.name}{_at(worst)}, {worst.worst.ratio:.2g} of it"
+        where = f"nearest to its limit {worst.name}{_time_text(worst)}, {worst.worst.ratio:.2g} of it"
         return f"equal: {count} quantit{'y' if count == 1 else 'ies'}; {where}"
     return f"differs: {sentence(worst)}"
 
@@ -96,14 +96,14 @@ def sentence(c: Compared) -> str:
         case "differs":
             unit = "" if c.unit == "1" else f" {c.unit}"
             values = f"{w.test:.9g}{unit}, reference {w.reference:.9g}{unit}, limit {c.limit:.3g}{unit}"
-            return f"{c.name}{_at(c)} is {_times(w.ratio)} over the limit: {values}" + (c.note and f"; {c.note}")
+            return f"{c.name}{_time_text(c)} is {_times(w.ratio)} over the limit: {values}" + (c.note and f"; {c.note}")
         case "coverage" | "events":
             over = f", {_times(w.ratio)} over the limit" if math.isfinite(w.ratio) else ""
             return f"{c.name}: {c.note}{over}"
         case _:
             words = {"unit": "is of another unit", "nonfinite": "cannot be within a limit"}
             word = words.get(c.status, f"is {c.status}")
-            return f"{c.name}{_at(c)} {word}: {c.note}"
+            return f"{c.name}{_time_text(c)} {word}: {c.note}"
 
 
 def table(verdict: Verdict, shown: int = SHOWN) -> str:
@@ -114,7 +114,7 @@ def table(verdict: Verdict, shown: int = SHOWN) -> str:
         ("quantity", "verdict", "times limit", "at [s]", "reference", "test", "limit", "unit")
     ]
     rows += [_row(c) for c in (*differing, *equal[:shown])]
-    lines = [aligned(rows, right=range(2, 7))]
+    lines = [align(rows, right=range(2, 7))]
     if len(equal) > shown:
         lines.append(f"... {len(equal) - shown} more within their limits")
     lines += [f"note: {note}" for note in verdict.notes]
@@ -137,7 +137,7 @@ def _row(c: Compared) -> tuple[str, ...]:
     return c.name, c.status, ratio, time, *values, "-" if math.isnan(c.limit) else f"{c.limit:.3g}", c.unit
 
 
-def _at(c: Compared) -> str:
+def _time_text(c: Compared) -> str:
     return "" if math.isnan(c.worst.time) else f" at {c.worst.time:.9g} s"
 
 
@@ -168,6 +168,7 @@ def as_json(verdict: Verdict) -> dict[str, Any]:
 
 
 def _object(c: Compared) -> dict[str, Any]:
+    """A compared quantity as an object of --json."""
     w = c.worst
     return {
         "name": c.name,

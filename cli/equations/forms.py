@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 import numpy as np
-from sysdyn.cli.analysis.asked import begun
-from sysdyn.cli.analysis.linear import inputs_of, linearised
+from sysdyn.cli.analysis.asked import model_at_start
+from sysdyn.cli.analysis.linear import inputs_of, linearise
 from sysdyn.cli.run.prepare import Prepared
 from sysdyn.cli.run.request.asked import Request
 from sysdyn.cli.run.request.targets import Target
@@ -26,7 +26,7 @@ from sysdyn.compiler.equations.matrices import Matrix, NoSuchEquations, canonica
 from sysdyn.compiler.equations.offsets import offsets
 from sysdyn.compiler.equations.port_hamiltonian import port_hamiltonian, written
 from sysdyn.compiler.forms.descriptor import DescriptorForm
-from sysdyn.compiler.forms.legendre import transformed
+from sysdyn.compiler.forms.legendre import legendre_transform
 from sysdyn.compiler.model.mirror import letter
 from sysdyn.dsl.model.expression import Node, const, scale, var
 from sysdyn.dsl.text.diagnostics import Report
@@ -67,23 +67,25 @@ def content_of(target: Target, prepared: Prepared, form: str, request: Request, 
 
 
 def _content(target: Target, prepared: Prepared, form: str, request: Request, report: Report) -> Content | None:
+    """Functions, equations and matrices of one form; NoSuchEquations where the model does not have it."""
     compiled = prepared.compiled
     algebra = algebra_of(compiled.form, [p.name for p in compiled.network.parameters if not p.shape])
     match form:
         case "matrices":
-            return Content(matrices=matrices(algebra, compiled.form), counted=tuple(_counted(compiled.form)))
+            return Content(matrices=matrices(algebra, compiled.form), counted=tuple(_count_lines(compiled.form)))
         case "canonical":
             function, rates = canonical(algebra, compiled.functions, compiled.form)
             return Content((function, variation(algebra, function, compiled.form)), tuple(rates))
         case "underlying":
             found_ = tuple(underlying(algebra, compiled.form))
-            return Content(equations=found_, counted=tuple(_counted(compiled.form)))
+            return Content(equations=found_, counted=tuple(_count_lines(compiled.form)))
         case "port_hamiltonian":
             function, view = written(algebra, port_hamiltonian(compiled.energies, compiled.form))
             return Content((function,), matrices=view)
+        # by class, with the transforms of T* and V beside
         case "efforts":
             found = tuple(classes(algebra, compiled.energies, compiled.form))
-            beside, _ = transformed(compiled.energies, compiled.network.parameters)
+            beside, _ = legendre_transform(compiled.energies, compiled.network.parameters)
             own = {"W", *compiled.energies.functions}
             more = (f for f in functions(algebra, beside) if f.name not in own)
             return Content((*functions(algebra, compiled.energies), *more), found)
@@ -94,6 +96,7 @@ def _content(target: Target, prepared: Prepared, form: str, request: Request, re
             return Content(equations=shown)
         case "linear":
             return _linear(target, prepared, request, report)
+        # the descriptor form, up to a number of rows
         case _:
             rows = sum(r.block in WORDS for r in compiled.form.rows) - MOST
             return Content(
@@ -103,7 +106,7 @@ def _content(target: Target, prepared: Prepared, form: str, request: Request, re
             )
 
 
-def _counted(form: DescriptorForm) -> Iterator[str]:
+def _count_lines(form: DescriptorForm) -> Iterator[str]:
     """Degrees of freedom as the book counts them, and which rows are differentiated for the index."""
     words = WORDS | CO_WORDS if form.formulation.startswith("co_") else WORDS
     n, m1, m2 = (sum(f.kind == kind for f in form.families) for kind in ("f", "kappa", "mu"))
@@ -128,26 +131,30 @@ def _linear(target: Target, prepared: Prepared, request: Request, report: Report
     A state of the reduction may be x - D u - D1 u' (runtime/linear/tangent.py): of x itself it is
     x' = A x + (B - A D) u + (D - A D1) u' + D1 u''.
     """
-    found = begun(target, prepared, request, report)
+    found = model_at_start(target, prepared, request, report)
     if found is None:
         return None
     inputs = inputs_of(target, prepared, None)
     try:
-        places = linearised(found, inputs).reduced.places
+        # where the reduced states are unknowns, these are outputs too: their own D and D1 tell them from the states
+        places = linearise(found, inputs).reduced.places
         watched = places[places >= 0]
-        small = linearised(found, inputs, watched=watched.tolist()).reduced
+        small = linearise(found, inputs, watched=watched.tolist()).reduced
     except NoLinearisation as error:
         raise NoSuchEquations(str(error)) from error
     system, count_ = found.system, watched.size
     d, d1 = (np.zeros((places.size, len(inputs))) for _ in range(2))
+    # x of the state z = x - D u - D1 u'
     d[places >= 0], d1[places >= 0] = (m[m.shape[0] - count_ :] for m in (small.d, small.d1))
     nodes = [
         unknown_node(system, int(k)) if k >= 0 else var(name, "s") for k, name in zip(places, small.names, strict=True)
     ]
     own = [tuple(map(const, map(float, at))) for _, at in inputs]
+    # inputs and their rates, as far as they occur
     controls = [var(name, "s", *at, order=k) for k in range(3) for (name, _), at in zip(inputs, own, strict=True)]
     slopes = np.hstack([small.a, small.b - small.a @ d, d - small.a @ d1, d1])
     a, b, c, c1 = (np.abs(part) for part in (small.a, small.b, d, d1))
+    # what cancels to round-off is no term
     sizes = np.hstack([a, b + a @ c, c + a @ c1, c1])
     slopes = np.where(np.abs(slopes) > ROUND_OFF * sizes, slopes, 0.0)
     lines = []

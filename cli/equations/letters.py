@@ -12,7 +12,7 @@ from collections.abc import Container, Iterable, Iterator, Sequence
 from itertools import count
 
 from sysdyn.compiler.forms.descriptor import DescriptorForm
-from sysdyn.compiler.model.mirror import letter, spelled
+from sysdyn.compiler.model.mirror import family_name, letter
 from sysdyn.dsl.model.expression import Node
 from sysdyn.dsl.model.network import Switch
 from sysdyn.values import dataclass
@@ -52,7 +52,7 @@ class Letters:
             self._numbers |= {(owner, kind): k for k, owner in enumerate(owners, 1)}
         self._slips: dict[str, Letter] = {}
         self._slipping: list[tuple[Letter, str, int]] = []
-        self._friction(switches, {named(p) for p in parameters})
+        self._friction(switches, {letter_of_name(p) for p in parameters})
 
     def _friction(self, switches: Sequence[Switch], taken: Container[Letter]) -> None:
         """Letters of the senses and directions of slips, with the labels and lines whose they are; taken: none of
@@ -65,14 +65,14 @@ class Letters:
                 self._slips[name] = Letter(base, (number, str(k)) if kind == "direction" else (number,), 0)
             self._slipping.append((Letter(base, (number,), 0), f"{kind} of {switch.label}", switch.place.start[0]))
 
-    def unknown(self, node: Node) -> Letter:
+    def letter_of(self, node: Node) -> Letter:
         """The symbol of an unknown without its indices."""
         owner, kind, order = node.data
         if (owner, kind) in self._numbers:
             return Letter(kind, (str(self._numbers[owner, kind]),), order)
         if kind in ("q", "f", "p"):
             return self._of_coordinate(owner, kind, order)
-        return self.name(spelled(self._formulation, owner, kind), order)
+        return self.name(family_name(self._formulation, owner, kind), order)
 
     def _of_coordinate(self, owner: str, kind: str, order: int) -> Letter:
         own = letter(self._formulation, kind)
@@ -86,7 +86,7 @@ class Letters:
 
     def name(self, text: str, order: int = 0) -> Letter:
         """A parameter, a dynamic variable, an implicit effort: a letter with an index where the name is one."""
-        return self._slips.get(text) or named(text, order)
+        return self._slips.get(text) or letter_of_name(text, order)
 
     def slipping(self) -> Sequence[tuple[Letter, str, int]]:
         """Letter, what it is of, line: of the senses and directions of slips."""
@@ -102,7 +102,7 @@ class Letters:
         return found
 
 
-def named(text: str, order: int = 0) -> Letter:
+def letter_of_name(text: str, order: int = 0) -> Letter:
     """A name as a letter with an index where it is one."""
     if text.startswith("#offset "):  # the constant of an integrated constraint
         return Letter("c", (text.removeprefix("#offset "),), order)

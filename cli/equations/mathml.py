@@ -8,7 +8,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 from html import escape
 
-from sysdyn.cli.equations.letters import GREEK, SHORT, is_letter, named, slips
+from sysdyn.cli.equations.letters import GREEK, SHORT, is_letter, letter_of_name, slips
 from sysdyn.dsl.model.expression import Node, topological
 from sysdyn.dsl.model.network import Loop, Switch
 
@@ -44,19 +44,19 @@ def row(*pieces: str) -> str:
 
 def name(text: str, index: Sequence[str] = (), order: int = 0) -> str:
     """A name, dotted as a rate, with what stands below it: `q1`, `tau_m` and `M.R` are q, tau and R with an index."""
-    letter = named(text)
+    letter = letter_of_name(text)
     below = [f"<mn>{part}</mn>" if part.isdigit() else mi(part) for part in letter.below]
-    base = _dotted(mi(_GREEK.get(SHORT.get(letter.base, letter.base), letter.base)), order)
+    base = _with_dots(mi(_GREEK.get(SHORT.get(letter.base, letter.base), letter.base)), order)
     below += index
-    return base if not below else f"<msub>{base}{row(*_separated(below))}</msub>"
+    return base if not below else f"<msub>{base}{row(*_comma_list(below))}</msub>"
 
 
 def coordinate(text: str, index: Sequence[str] = (), order: int = 0) -> str:
     """A displacement coordinate: its own name where that is a symbol, else q with the name below."""
-    return name(text, index, order) if is_letter(text) else _of("q", text, index, order)
+    return name(text, index, order) if is_letter(text) else _quantity_of("q", text, index, order)
 
 
-def _separated(pieces: Sequence[str]) -> list[str]:
+def _comma_list(pieces: Sequence[str]) -> list[str]:
     found = [pieces[0]]
     for piece in pieces[1:]:
         found += [mo(","), piece]
@@ -105,7 +105,7 @@ class Typesetter:
             made[node] = (mo("…"), ATOM) if size[node] > LARGEST else self._node(node, [made[a] for a in node.args])
         return made[root][0]
 
-    def held(self, root: Node) -> str:
+    def parenthesize(self, root: Node) -> str:
         """The expression, in parentheses where it is a sum."""
         text = self.expression(root)
         return row(mo("("), text, mo(")")) if root.op in ("sum", "cond", "cmp", "and", "or") else text
@@ -121,7 +121,7 @@ class Typesetter:
             pieces += [counter(loop.index), *ends]
         return row(*pieces) if pieces else ""
 
-    def summed(self, nest: Sequence[Loop], body: str) -> str:
+    def sum_over(self, nest: Sequence[Loop], body: str) -> str:
         """The sum of a body over loops."""
         for loop in reversed(nest):
             low = row(counter(loop.index), mo("="), self.expression(loop.first))
@@ -129,6 +129,7 @@ class Typesetter:
         return body
 
     def _node(self, node: Node, args: list[tuple[str, int]]) -> tuple[str, int]:
+        """MathML of a node with its strength, from those of its arguments."""
         texts = [text for text, _ in args]
         match node.op:
             case "const":
@@ -136,7 +137,7 @@ class Typesetter:
             case "param":
                 if node.data in self._slips:
                     letter, label, part = self._slips[node.data]
-                    return _of(letter, label, [*part, *texts]), ATOM
+                    return _quantity_of(letter, label, [*part, *texts]), ATOM
                 return name(node.data.lstrip("#"), texts), ATOM
             case "index":
                 return counter(node.data), ATOM
@@ -144,43 +145,45 @@ class Typesetter:
                 return mi("t"), ATOM
             case "var":
                 family, kind, order = node.data
-                return self.unknown(family, kind, order, texts), ATOM
+                return self.typeset_unknown(family, kind, order, texts), ATOM
             case "sum":
                 return _sum(node, args), SUM
             case "mul":
                 return _product(node, args), PRODUCT
             case "pow":
-                return f"<msup>{_held(args[0], ATOM)}{row(texts[1])}</msup>", POWER
+                return f"<msup>{_parenthesize(args[0], ATOM)}{row(texts[1])}</msup>", POWER
             case _:
                 return _function(node, args)
 
-    def unknown(self, family: str, kind: str, order: int, index: Sequence[str] = ()) -> str:
+    def typeset_unknown(self, family: str, kind: str, order: int, index: Sequence[str] = ()) -> str:
         """An unknown: x, its rates dotted, momenta p, multipliers κ and μ; of branches and nodes their own e f q p."""
+        # of a branch or node: the letter with its owner below
         if kind[0] in "nb" and len(kind) == 2:
-            return _of(kind[1], family, index, order)
+            return _quantity_of(kind[1], family, index, order)
         if family.startswith("#"):
             family = family.lstrip("#")
         match kind:
+            # rates of displacements are dotted; in the complementary family they are momenta
             case "q" | "f" if family in self._coordinates:
                 order += kind == "f"
                 if self._complementary:
-                    return _of("p", family, index, order)
+                    return _quantity_of("p", family, index, order)
                 own = family not in self._elements
-                return coordinate(family, index, order) if own else _of("q", family, index, order)
+                return coordinate(family, index, order) if own else _quantity_of("q", family, index, order)
             case "p":
-                return _of("q" if self._complementary else "p", family, index, order)
+                return _quantity_of("q" if self._complementary else "p", family, index, order)
             case "kappa" | "mu":
-                return _of("κ" if kind == "kappa" else "μ", family, index, order)
+                return _quantity_of("κ" if kind == "kappa" else "μ", family, index, order)
             case "audit":
                 return mi(f"audit.{family}")
             case _:
                 return name(family, index, order)
 
 
-def _of(letter: str, family: str, index: Sequence[str], order: int = 0) -> str:
+def _quantity_of(letter: str, family: str, index: Sequence[str], order: int = 0) -> str:
     """A quantity of an object, which stands below it."""
-    below = row(*_separated([*map(mi, family.split("#")), *index]))
-    return f"<msub>{_dotted(mi(letter), order)}{below}</msub>"
+    below = row(*_comma_list([*map(mi, family.split("#")), *index]))
+    return f"<msub>{_with_dots(mi(letter), order)}{below}</msub>"
 
 
 def counter(index: str) -> str:
@@ -192,20 +195,21 @@ def counter(index: str) -> str:
     return mi(text or index)
 
 
-def _dotted(base: str, order: int) -> str:
+def _with_dots(base: str, order: int) -> str:
     return base if not order else f"<mover accent='true'>{base}{mo('˙' if order == 1 else '¨')}</mover>"
 
 
-def _held(piece: tuple[str, int], strength: int) -> str:
+def _parenthesize(piece: tuple[str, int], strength: int) -> str:
     """A piece in parentheses where it would fall apart."""
     text, own = piece
     return text if own >= strength else row(mo("("), text, mo(")"))
 
 
 def _sum(node: Node, args: list[tuple[str, int]]) -> str:
+    """MathML of a sum, positive terms first."""
     constant, coefficients = node.data
     pieces: list[str] = []
-    parts = [(c, _held(a, PRODUCT)) for c, a in zip(coefficients, args, strict=True)]
+    parts = [(c, _parenthesize(a, PRODUCT)) for c, a in zip(coefficients, args, strict=True)]
     parts.sort(key=lambda part: part[0] < 0)  # a sum that can begin without a sign does
     for c, text in parts:
         if pieces or c < 0:
@@ -228,23 +232,25 @@ def _coefficient(value: float) -> str:
 
 
 def _product(node: Node, args: list[tuple[str, int]]) -> str:
+    """MathML of a product: a fraction where there are negative exponents."""
     above: list[str] = []
     below: list[str] = []
     for e, piece in zip(node.data, args, strict=True):
         text, size = piece[0], abs(e)
+        # one factor above or below the bar needs no parentheses
         alone = sum((x < 0) == (e < 0) for x in node.data) == 1 and any(x < 0 for x in node.data)
         if size == 0.5:
             text = f"<msqrt>{text}</msqrt>"
         elif size != 1.0:
-            text = f"<msup>{_held(piece, ATOM)}{row(_coefficient(size))}</msup>"
+            text = f"<msup>{_parenthesize(piece, ATOM)}{row(_coefficient(size))}</msup>"
         elif not alone:
-            text = _held(piece, PRODUCT)
+            text = _parenthesize(piece, PRODUCT)
         (above if e > 0 else below).append(text)
-    top = _beside(above) if above else "<mn>1</mn>"
-    return top if not below else f"<mfrac>{row(top)}{row(_beside(below))}</mfrac>"
+    top = _juxtapose(above) if above else "<mn>1</mn>"
+    return top if not below else f"<mfrac>{row(top)}{row(_juxtapose(below))}</mfrac>"
 
 
-def _beside(pieces: list[str]) -> str:
+def _juxtapose(pieces: list[str]) -> str:
     found = [pieces[0]]
     for piece in pieces[1:]:
         found += ["<mspace width='.14em'/>", piece]
@@ -252,6 +258,7 @@ def _beside(pieces: list[str]) -> str:
 
 
 def _function(node: Node, args: list[tuple[str, int]]) -> tuple[str, int]:
+    """MathML of conditions, comparisons, reductions, tables and functions."""
     texts = [text for text, _ in args]
     match node.op:
         case "cond":
@@ -260,30 +267,30 @@ def _function(node: Node, args: list[tuple[str, int]]) -> tuple[str, int]:
         case "cmp":
             return row(texts[0], mo(_SIGNS[node.data]), texts[1]), SUM
         case "and" | "or":
-            pieces = [_held(args[0], PRODUCT)]
+            pieces = [_parenthesize(args[0], PRODUCT)]
             for piece in args[1:]:
-                pieces += [mo("∧" if node.op == "and" else "∨"), _held(piece, PRODUCT)]
+                pieces += [mo("∧" if node.op == "and" else "∨"), _parenthesize(piece, PRODUCT)]
             return row(*pieces), SUM
         case "not":
-            return row(mo("¬"), _held(args[0], ATOM)), PRODUCT
+            return row(mo("¬"), _parenthesize(args[0], ATOM)), PRODUCT
         case "reduce":
-            return _reduced(node, args), PRODUCT
+            return _reduction(node, args), PRODUCT
         case "table":
             label, orders = node.data
             primes = "′" * orders if isinstance(orders, int) else f"({', '.join(map(str, orders))})"
-            return row(mi(label + primes), mo("("), *_separated(texts), mo(")")), ATOM
+            return row(mi(label + primes), mo("("), *_comma_list(texts), mo(")")), ATOM
     if node.data == "abs":
         return row(mo("|"), texts[0], mo("|")), ATOM
     if node.data == "exp" and "<mfrac>" not in texts[0]:
         return f"<msup><mi mathvariant='normal'>e</mi>{row(texts[0])}</msup>", POWER
-    return row(mi(node.data), mo("&#x2061;"), mo("("), *_separated(texts), mo(")")), ATOM
+    return row(mi(node.data), mo("&#x2061;"), mo("("), *_comma_list(texts), mo(")")), ATOM
 
 
-def _reduced(node: Node, args: list[tuple[str, int]]) -> str:
+def _reduction(node: Node, args: list[tuple[str, int]]) -> str:
     operator, index = node.data
     first, last, body = (text for text, _ in args)
     low = row(counter(index), mo("="), first)
     sign = {"sum": "∑", "prod": "∏"}.get(operator)
     if sign is not None:
-        return row(f"<munderover>{mo(sign)}{low}{row(last)}</munderover>", _held(args[2], PRODUCT))
+        return row(f"<munderover>{mo(sign)}{low}{row(last)}</munderover>", _parenthesize(args[2], PRODUCT))
     return row(f"<munder>{mi(operator)}{row(low, mo('…'), last)}</munder>", mo("("), body, mo(")"))

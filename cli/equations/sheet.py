@@ -135,7 +135,7 @@ class Sheets:
         lines = [self._matrix(m) for m in content.matrices] + [self.line(e) for e in content.equations]
         legend = tuple(self.legend()) if content.equations else ((self._flows(), "", 0),)
         legend = () if any(e.kind == "element" for e in content.equations) else legend
-        functions = tuple(self.named(f) for f in content.functions)
+        functions = tuple(self.function_line(f) for f in content.functions)
         said = ((self.writers[0].symbol(letter, ()), what, line) for letter, what, line in self.letters.slipping())
         return Sheet(functions, tuple(lines), legend, content.more, content.counted, tuple(said))
 
@@ -151,7 +151,7 @@ class Sheets:
     def _entry(self, writer: Writer, terms: Sequence[Node]) -> str:
         return writer.sum_of([Summed((), term) for term in terms])
 
-    def named(self, function: Function) -> Line:
+    def function_line(self, function: Function) -> Line:
         """A state function or virtual work."""
         texts = tuple(self._function(writer, function) for writer in self.writers)
         name = REFLECTED[function.name] if self.complementary else function.name
@@ -162,13 +162,13 @@ class Sheets:
     def _function(self, writer: Writer, function: Function) -> str:
         if not function.efforts:
             return writer.sum_of(function.terms)
-        return _added([self._effort(writer, effort) for effort in function.efforts], writer.minus)
+        return _sum_text([self._effort(writer, effort) for effort in function.efforts], writer.minus)
 
     def _effort(self, writer: Writer, effort: Effort) -> str:
         """Q delta q, summed."""
         text = writer.sum_of([Summed((), term) for term in effort.terms])
         single = len(effort.terms) == 1 and (effort.terms[0].op != "sum" or len(effort.terms[0].args) == 1)
-        text = writer.joined([text if single else writer.held(text), writer.varied(effort.on)])
+        text = writer.product([text if single else writer.parenthesize(text), writer.variation(effort.on)])
         for loop in reversed(effort.over):
             text = writer.total("sum", loop, text)
         return text
@@ -204,7 +204,7 @@ class Sheets:
             yield {"kappa": "κ", "mu": "μ"}[kind] + str(number), owner, line
 
 
-def _added(pieces: Sequence[str], minus: str) -> str:
+def _sum_text(pieces: Sequence[str], minus: str) -> str:
     found = list(pieces[:1])
     for piece in pieces[1:]:
         found.append(f"{minus} {piece.removeprefix(minus)}" if piece.startswith(minus) else f"+ {piece}")

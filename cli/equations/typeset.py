@@ -80,22 +80,22 @@ def page(title: str, content: Content, compiled: CompiledModel) -> str:
     parts = (
         functions(content.functions, types, complementary=complementary),
         (f"<span></span><div>{matrix(m, types)}</div>" for m in content.matrices),
-        rows(content.equations, types, _unlinked, complementary=complementary),
+        rows(content.equations, types, _plain_label, complementary=complementary),
     )
     body = "".join(f'<div class="equations">{"".join(part)}</div>' for part in parts)
     return document(title, f"<h1>{escape(title)}</h1>{body}")
 
 
-def _unlinked(place: Place | None, label: str) -> str:
+def _plain_label(place: Place | None, label: str) -> str:
     return f"<span>{label}</span>"
 
 
 def _effort(types: Typesetter, over: Nest, found: Sequence[Node], on: Node) -> str:
     """Q delta q."""
     effort = _plus([types.expression(term) for term in found])
-    held = types.held(found[0]) if len(found) == 1 and found[0].op != "sum" else row(mo("("), effort, mo(")"))
+    held = types.parenthesize(found[0]) if len(found) == 1 and found[0].op != "sum" else row(mo("("), effort, mo(")"))
     single = len(found) == 1 and len(found[0].args) == 1
-    return types.summed(over, row(effort if single else held, mo("δ"), types.held(on)))
+    return types.sum_over(over, row(effort if single else held, mo("δ"), types.parenthesize(on)))
 
 
 def _symbol(name: str) -> str:
@@ -105,7 +105,7 @@ def _symbol(name: str) -> str:
 def terms(found: Iterable[Summed], types: Typesetter) -> str:
     """Terms with their signs."""
     texts = [
-        types.summed(t.over, (types.held if t.over else types.expression)(t.expression))
+        types.sum_over(t.over, (types.parenthesize if t.over else types.expression)(t.expression))
         for t in found
         if not is_const(t.expression, 0.0)
     ]

@@ -8,7 +8,7 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from collections.abc import Sequence
 
-from sysdyn.cli.equations.letters import GREEK, SHORT, Letter, Letters, named
+from sysdyn.cli.equations.letters import GREEK, SHORT, Letter, Letters, letter_of_name
 from sysdyn.compiler.equations.book import Summed
 from sysdyn.compiler.equations.order import Order
 from sysdyn.dsl.model.expression import Node, topological
@@ -41,7 +41,7 @@ class Writer(ABC):
         """A quotient; held: what stands above, as one factor."""
 
     @abstractmethod
-    def raised(self, base: Piece, exponent: str) -> str:
+    def power(self, base: Piece, exponent: str) -> str:
         """A power."""
 
     @abstractmethod
@@ -49,7 +49,7 @@ class Writer(ABC):
         """A square root."""
 
     @abstractmethod
-    def held(self, text: str) -> str:
+    def parenthesize(self, text: str) -> str:
         """In parentheses."""
 
     @abstractmethod
@@ -61,11 +61,11 @@ class Writer(ABC):
         """A sum or product over a range."""
 
     @abstractmethod
-    def joined(self, factors: Sequence[str]) -> str:
+    def product(self, factors: Sequence[str]) -> str:
         """A product."""
 
     @abstractmethod
-    def varied(self, on: Node) -> str:
+    def variation(self, on: Node) -> str:
         """The variation of a displacement."""
 
     def expression(self, root: Node) -> str:
@@ -86,24 +86,27 @@ class Writer(ABC):
         """Terms with their signs; 0 where there is none."""
         found: list[str] = []
         for term in terms:
-            sign, text = self._signed(term)
+            sign, text = self._sign_and_text(term)
             if not found:
                 found.append(f"{self.minus}{text}" if sign < 0 else text)
             else:
                 found.append(f"{self.minus if sign < 0 else '+'} {text}")
         return " ".join(found) or "0"
 
-    def _signed(self, term: Summed) -> tuple[int, str]:
+    def _sign_and_text(self, term: Summed) -> tuple[int, str]:
+        """Sign and text of a term with its sums, so that a minus stands between terms and not inside of them."""
         sign, node = 1, term.expression
         text, strength = self.piece(node)
+        # -2 x: the sign in front
         if node.op == "sum" and node.data[0] == 0.0 and len(node.args) == 1 and node.data[1][0] < 0.0:
             sign = -1
             text = text.removeprefix(self.minus)
             strength = PRODUCT
         elif node.op == "const" and node.data < 0:
             sign, text = -1, text.removeprefix(self.minus)
+        # a sum under a summation sign
         if term.over and strength < PRODUCT:
-            text = self.held(text)
+            text = self.parenthesize(text)
         for loop in reversed(term.over):
             text = self.total("sum", loop, text)
         return sign, text
@@ -128,6 +131,7 @@ class Writer(ABC):
         return f"{sign}{size:.12g}", SUM if sign else ATOM
 
     def _node(self, node: Node, args: list[Piece]) -> Piece:
+        """Text of a node with its strength, from those of its arguments."""
         texts = [text for text, _ in args]
         match node.op:
             case "const":
@@ -139,18 +143,20 @@ class Writer(ABC):
             case "time":
                 return "t", ATOM
             case "var":
-                return self.symbol(self.letters.unknown(node), texts), ATOM
+                return self.symbol(self.letters.letter_of(node), texts), ATOM
             case "sum":
                 return self._sum(node, args)
             case "mul":
                 return self._product(1.0, node, args)
             case "pow":
-                return self.raised(args[0], texts[1]), POWER
+                return self.power(args[0], texts[1]), POWER
             case _:
                 return self._call(node, args)
 
     def _sum(self, node: Node, args: list[Piece]) -> Piece:
+        """Text of a sum, positive terms first, then in the order of a book."""
         constant, coefficients = node.data
+        # a multiple
         if constant == 0.0 and len(args) == 1:
             return self._times(coefficients[0], node.args[0], args[0])
         parts = sorted(zip(coefficients, node.args, args, strict=True), key=lambda p: (p[0] < 0, self._rank(p[1])))
@@ -172,10 +178,11 @@ class Writer(ABC):
         elif node.op == "mul":
             text, strength = self._product(size, node, [self.piece(a) for a in node.args])
         else:
-            text, strength = self._beside(size, [self._hold(piece, PRODUCT)], [])
+            text, strength = self._quotient(size, [self._hold(piece, PRODUCT)], [])
         return f"{sign}{text}", SUM if sign else strength
 
     def _product(self, factor: float, node: Node, args: list[Piece]) -> Piece:
+        """Text of a product, above and below the bar; square roots as roots."""
         above: list[str] = []
         below: list[str] = []
         pairs = sorted(zip(node.args, node.data, args, strict=True), key=lambda p: self._rank(p[0]))
@@ -185,16 +192,16 @@ class Writer(ABC):
             if size == 0.5:
                 text = self.root(piece[0])
             elif size != 1.0:
-                text = self.raised(piece, self.number(size)[0])
+                text = self.power(piece, self.number(size)[0])
             else:
                 text = piece[0] if exponent < 0 and alone and self.bare_below else self._hold(piece, PRODUCT)
             (above if exponent > 0 else below).append(text)
-        return self._beside(factor, above, below)
+        return self._quotient(factor, above, below)
 
     bare_below = False
     """Whether what stands below needs no parentheses."""
 
-    def _beside(self, factor: float, above: list[str], below: list[str]) -> Piece:
+    def _quotient(self, factor: float, above: list[str], below: list[str]) -> Piece:
         """Factor times what stands above, by what stands below."""
         if factor != 1.0:
             whole = factor * 12.0
@@ -204,16 +211,17 @@ class Writer(ABC):
                 above = ([str(int(factor * over))] if factor * over != 1 or not above else []) + above
             else:
                 above = [self.number(factor)[0], *above]
-        top = self.joined(above) if above else "1"
+        top = self.product(above) if above else "1"
         if not below:
             return top, PRODUCT if len(above) > 1 else ATOM if factor == 1.0 else PRODUCT
-        under = self.joined(below)
+        under = self.product(below)
         return self.fraction(top, (under, PRODUCT if len(below) > 1 else ATOM), (top, ATOM))
 
     def _hold(self, piece: Piece, strength: int) -> str:
-        return piece[0] if piece[1] >= strength else self.held(piece[0])
+        return piece[0] if piece[1] >= strength else self.parenthesize(piece[0])
 
     def _call(self, node: Node, args: list[Piece]) -> Piece:
+        """Text of conditions, comparisons, reductions, tables and functions."""
         texts = [text for text, _ in args]
         match node.op:
             case "cond":
@@ -249,18 +257,18 @@ class Text(Writer):
 
     def fraction(self, above: str, below: Piece, held: Piece) -> Piece:
         """a/b."""
-        return f"{above}/{below[0] if below[1] == ATOM else self.held(below[0])}", PRODUCT
+        return f"{above}/{below[0] if below[1] == ATOM else self.parenthesize(below[0])}", PRODUCT
 
-    def raised(self, base: Piece, exponent: str) -> str:
+    def power(self, base: Piece, exponent: str) -> str:
         """a^b."""
-        exponent = exponent if exponent.replace(".", "").isalnum() else self.held(exponent)
+        exponent = exponent if exponent.replace(".", "").isalnum() else self.parenthesize(exponent)
         return f"{self._hold(base, ATOM)}^{exponent}"
 
     def root(self, inner: str) -> str:
         """Of a square."""
         return f"sqrt({inner})"
 
-    def held(self, text: str) -> str:
+    def parenthesize(self, text: str) -> str:
         """(a)."""
         return f"({text})"
 
@@ -273,11 +281,11 @@ class Text(Writer):
         first, last = self.expression(loop.first), self.expression(loop.last)
         return f"{sign}({self.counter(loop.index)} = {first}..{last}) {body}"
 
-    def joined(self, factors: Sequence[str]) -> str:
+    def product(self, factors: Sequence[str]) -> str:
         """A b c."""
         return " ".join(factors)
 
-    def varied(self, on: Node) -> str:
+    def variation(self, on: Node) -> str:
         """δx, δ(x + y)."""
         text, strength = self.piece(on)
         return f"δ{text}" if strength == ATOM else f"δ({text})"
@@ -295,7 +303,7 @@ class Latex(Writer):
             base = f"\\{base}"
         elif len(base) > 1:
             face = "\\textit" if " " in base else "\\mathit"
-            base = f"{face}{{{_escaped(base)}}}"
+            base = f"{face}{{{_escape(base)}}}"
         base = ("", "\\dot ", "\\ddot ")[min(letter.dots, 2)] + base
         below = ",".join([*map(_below, letter.below), *index])
         return f"{base}_{{{below}}}" if below else base
@@ -304,7 +312,7 @@ class Latex(Writer):
         r"""\frac{a}{b}."""
         return f"\\frac{{{above}}}{{{below[0]}}}", ATOM
 
-    def raised(self, base: Piece, exponent: str) -> str:
+    def power(self, base: Piece, exponent: str) -> str:
         """a^{b}."""
         return f"{{{self._hold(base, ATOM)}}}^{{{exponent}}}"
 
@@ -312,7 +320,7 @@ class Latex(Writer):
         r"""\sqrt{a}."""
         return f"\\sqrt{{{inner}}}"
 
-    def held(self, text: str) -> str:
+    def parenthesize(self, text: str) -> str:
         r"""\left(a\right)."""
         return f"\\left({text}\\right)"
 
@@ -321,7 +329,7 @@ class Latex(Writer):
         if name == "abs":
             return f"\\left|{args[0]}\\right|"
         known = name in ("sin", "cos", "tan", "sinh", "cosh", "tanh", "exp", "ln", "min", "max")
-        shown = f"\\{name}" if known else f"\\operatorname{{{_escaped(name)}}}"
+        shown = f"\\{name}" if known else f"\\operatorname{{{_escape(name)}}}"
         return f"{shown}\\left({', '.join(args)}\\right)"
 
     def total(self, sign: str, loop: Loop, body: str) -> str:
@@ -330,14 +338,14 @@ class Latex(Writer):
         first, last = self.expression(loop.first), self.expression(loop.last)
         return f"{shown}_{{{self.counter(loop.index)}={first}}}^{{{last}}} {body}"
 
-    def joined(self, factors: Sequence[str]) -> str:
+    def product(self, factors: Sequence[str]) -> str:
         r"""A \, b."""
         return " \\, ".join(factors)
 
-    def varied(self, on: Node) -> str:
+    def variation(self, on: Node) -> str:
         r"""\delta x."""
         text, strength = self.piece(on)
-        return f"\\delta {text}" if strength == ATOM else f"\\delta {self.held(text)}"
+        return f"\\delta {text}" if strength == ATOM else f"\\delta {self.parenthesize(text)}"
 
 
 _GREEK = {"kappa": "κ", "mu": "μ", "sigma": "σ"}
@@ -348,12 +356,12 @@ def _below(part: str) -> str:
     """What stands below a letter: numbers and letters as they are, Greek names as letters, words upright."""
     if part.isdigit() or len(part) == 1:
         return part
-    found = named(part)
+    found = letter_of_name(part)
     base = SHORT.get(found.base, found.base)
     if base in GREEK and base != "omicron" and all(p.isdigit() for p in found.below):
         return f"\\{base}_{{{found.below[0]}}}" if found.below else f"\\{base}"
-    return f"\\mathrm{{{_escaped(part)}}}"
+    return f"\\mathrm{{{_escape(part)}}}"
 
 
-def _escaped(name: str) -> str:
+def _escape(name: str) -> str:
     return name.replace("_", "\\_")

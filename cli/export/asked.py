@@ -12,7 +12,7 @@ from sysdyn.cli.run.request.asked import Request
 from sysdyn.cli.run.start.flat_laws import impossible
 from sysdyn.cli.run.start.starting import start
 from sysdyn.dsl import load
-from sysdyn.dsl.elaborate.scenes.stopping import unwatched
+from sysdyn.dsl.elaborate.scenes.stopping import drop_measuring_states
 from sysdyn.dsl.model.network import Network
 from sysdyn.dsl.text.diagnostics import Report
 from sysdyn.runtime.model.failures import NoSuchForm
@@ -20,14 +20,14 @@ from sysdyn.runtime.model.failures import NoSuchForm
 
 def network_of(request: Request, report: Report) -> Network | None:
     """The model that is named, whole, or under the scene that is; None where the report says why not."""
-    target = targets.asked(request, report, targets.whole)
+    target = targets.target_of(request, report, targets.whole)
     if target is None:
         return None
     inner, required = Report(), target.scene is not None
     asked = target.document, target.model, target.scene, inner, request.settings
     network = load.network(*asked, levels=request.levels, required=required)
-    report.extend(inner if network else targets.unsupported(inner))
-    return None if network is None else unwatched(network)
+    report.extend(inner if network else targets.refuse_unsupported(inner))
+    return None if network is None else drop_measuring_states(network)
 
 
 def formed_of(prepared: Prepared, index: str | None, report: Report) -> Formed | None:
@@ -40,7 +40,7 @@ def formed_of(prepared: Prepared, index: str | None, report: Report) -> Formed |
 
 
 @contextmanager
-def refused(prepared: Prepared, report: Report) -> Iterator[None]:
+def report_impossible(prepared: Prepared, report: Report) -> Iterator[None]:
     """A form that does not exist is an error of the report (E607)."""
     try:
         yield

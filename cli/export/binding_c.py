@@ -79,7 +79,7 @@ def binding_c(tables: Tables, following: Following, form: DescriptorForm) -> str
         *(_core(name) for name in names),
         *(f"#undef sd_{name}" for name in _RENAMED),
         _TYPES,
-        *_declared(tables),
+        *_prototypes(tables),
         emit_c(following.program, form, head="/* what follows from given parameters */"),
         *_whole(tables),
         (HERE / "outside.c").read_text(encoding="ascii"),
@@ -98,7 +98,7 @@ def _core(name: str) -> str:
     return f"/* ---- {name} ---- */\n" + re.sub(r'(?m)^#include "[^"]*"\n', "", text)
 
 
-def _declared(tables: Tables) -> Iterable[str]:
+def _prototypes(tables: Tables) -> Iterable[str]:
     """Prototypes of the blocks."""
     systems = [tables.system, *([tables.start.system] if tables.start else [])]
     found: dict[str, None] = {}
@@ -143,6 +143,7 @@ def _scratch(system: Assembled) -> int:
 def _system(name: str, system: Assembled) -> Iterable[str]:
     """The arrays and the structure of one assembled form."""
     calls = []
+    # the tables of each block's routine
     for k, call in enumerate(system.calls):
         for table in ("at", "to", "dy", "dyd"):
             yield ints(f"{name}_{table}_{k}", getattr(call, table))
@@ -151,6 +152,7 @@ def _system(name: str, system: Assembled) -> Iterable[str]:
     fields = ("k_q", "k_f", "k_slot_q", "k_slot_f", "held_row", "held_unknown", "held_slot", "cleared")
     for field in ("column", "row", *fields):
         yield ints(f"{name}_{field}", getattr(system, field))
+    # kinematic rows that lie one after the other go as stretches
     spans = stretches(system.k_row, system.k_q, system.k_f)
     yield ints(f"{name}_k_span", spans.ravel())
     yield doubles(f"{name}_k_scale", np.ones(system.k_row.size))
@@ -183,6 +185,7 @@ def _whole(tables: Tables) -> Iterable[str]:
     system = tables.system
     pattern = tables.state or system
     n = tables.y0.size
+    # what anyone may read
     yield "const int32_t sd_version = SD_EXPORT_VERSION;"
     sizes = (("unknowns", n), ("entries", pattern.row.size), ("parameters", tables.p.size))
     for name, value in (*sizes, ("outputs", len(tables.outputs))):
@@ -193,6 +196,7 @@ def _whole(tables: Tables) -> Iterable[str]:
     yield f"const double sd_t0 = {_double(tables.t0)};"
     for name, values in (("p0", tables.p), ("y0", tables.y0), ("yd0", tables.yd0), ("scale", tables.scale)):
         yield doubles(f"sd_{name}", values, public=True)
+    # what the routines read
     yield ints("ix", tables.ix)
     yield ints("following_ix", tables.following_ix)
     yield ints("structural", tables.structural)
@@ -200,6 +204,7 @@ def _whole(tables: Tables) -> Iterable[str]:
     if tables.state is not None:
         yield doubles("full_y", tables.full_y)
         yield doubles("full_yd", tables.full_yd)
+    # sizes of rooms, known when the file is compiled
     constants = {
         "STRUCTURAL": tables.structural.size,
         "STATE": int(tables.state is not None),
@@ -218,15 +223,17 @@ def _whole(tables: Tables) -> Iterable[str]:
     yield from _system("s", system)
     yield "#define form s_form"
     yield ints("written_at", tables.at)
+    # explicit form: the matrix that is solved for rates
     if tables.state:
         yield from _state(tables.state, system)
-    yield from _observed(tables)
+    yield from _output_tables(tables)
     yield from _groups(tables)
     if start is not None:
         yield from _start(start)
 
 
 def _state(state: State, system: Assembled) -> Iterable[str]:
+    """Tables of the explicit form: the matrix of rates and multipliers, and the places of the state."""
     chosen, calls = state.selection, len(system.calls)
     yield _MATRIX
     yield ints("state_place", state.places)
@@ -250,7 +257,7 @@ def _state(state: State, system: Assembled) -> Iterable[str]:
     yield f"static const sd_matrix_form matrix_form = {{{sizes}, {arrays.format(order=order)}, m_magnitude}};"
 
 
-def _observed(tables: Tables) -> Iterable[str]:
+def _output_tables(tables: Tables) -> Iterable[str]:
     if not tables.outputs:
         return
     yield ints("audit_at", tables.audit_at)
@@ -274,6 +281,7 @@ def _groups(tables: Tables) -> Iterable[str]:
 
 
 def _start(start: Start) -> Iterable[str]:
+    """Tables of the consistent start: its system, known values, and the stages that are tried in turn."""
     system = start.system
     yield from _system("b", system)
     yield "#define start_form b_form"
@@ -289,6 +297,7 @@ def _start(start: Start) -> Iterable[str]:
     yield doubles("start_scale", start.scale)
     yield doubles("start_weight", start.weight)
     stages = []
+    # each stage's rows and unknowns, trial by trial
     for k, stage in enumerate(start.stages):
         trials = []
         for i, (rows, places) in enumerate(stage.trials):

@@ -43,6 +43,7 @@ def binding_json(formed: Formed, tables: Tables, following: Following) -> str:
         "sd_rowind": pattern.row,
         "tables": {f.name: getattr(tables, f.name) for f in fields(tables) if f.name not in _ABOVE},
     }
+    # a line for each key: differences are read line by line
     lines = [f"{json.dumps(key)}: {_text(value)}" for key, value in found.items()]
     return "{\n" + ",\n".join(lines) + "\n}\n"
 
@@ -55,6 +56,7 @@ def parameters(
 ) -> list[dict[str, Any]]:
     """Each parameter: place in p, SI unit, shape, what it follows from, whether sizes depend on it."""
     found, place = [], 0
+    # p holds scalars first, then arrays
     for scalar in (p for p in network.parameters if not p.shape):
         found.append((scalar, place, 1))
         place += 1

@@ -72,6 +72,7 @@ def _inertial(form: DescriptorForm) -> set[str]:
             continue
         for kernel in block.kernels:
             for row in kernel.rows:
+                # the slope by a rate, by a flow in a momentum row, by an implicit unknown in a gamma
                 for column in variables(row.expression):
                     if column.op == "var" and (column.data[2] == 1 or block.name in ("momentum", "gamma")):
                         value = derivative(row.expression, column)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 from sysdyn.cli.export.starts import start_tables
-from sysdyn.cli.export.tables import NOTHING, Call, Group, Output, State, Tables, assembled
+from sysdyn.cli.export.tables import NOTHING, Call, Group, Output, State, Tables, assembly_tables
 from sysdyn.cli.run.prepare import Prepared
 from sysdyn.cli.run.start.starting import Started
 from sysdyn.compiler.binding.following import Following, following
@@ -68,13 +68,16 @@ def tables(formed_: Formed) -> tuple[Tables, Following]:
     compiled = prepared.compiled
     found = following(compiled.network, compiled.form, compiled.program, prepared.binding)
     y, yd = state.for_form(system)
+    # the form without implicit rates has a state of its own
     inner = _state(system, state) if system.form.name == "0" else None
     places = np.arange(system.unknowns) if inner is None else inner.places
     _, jyd = system.jacobian(state.t, y, yd)
     differential = np.isin(system.kinds, STATE) & (system.differential(jyd) | (system.kinds == "q"))
+    # y' - F: every unknown is differential
     if inner is not None:
         differential[:] = True
         yd = _slopes(system, state, yd)
+    # magnitudes of the start, 1 of what is beside
     scale = np.ones(system.unknowns)
     scale[: state.y.size] = _scale(formed_.written, state)
     observe, observed = _observer(system, "observe")
@@ -95,7 +98,7 @@ def tables(formed_: Formed) -> tuple[Tables, Following]:
         written=system.form.written,
         followed=system.another("start").unknowns,
         at=system.form.at,
-        system=assembled(system),
+        system=assembly_tables(system),
         state=inner,
         start=start_tables(formed_.written, state),
         groups=tuple(_group(group, system) for group in found.groups),
@@ -140,6 +143,7 @@ def _pattern(system: System, selection: Selection, places: Ints) -> tuple[Ints, 
 
     solved, first = selection.unknown.size, system.form.kinematics
     matrix = selection.pattern
+    # rows and unknowns of the matrix in connected components: each slope of a component reads all its rows
     joined = coo_array(
         (np.ones(matrix.entries), (matrix.row, solved + matrix.columns_of())), shape=(2 * solved, 2 * solved)
     )
@@ -147,6 +151,7 @@ def _pattern(system: System, selection: Selection, places: Ints) -> tuple[Ints, 
     number = np.full(system.unknowns, -1, dtype=np.int64)
     number[places] = np.arange(places.size)
     every, of_row, of_column = np.arange(places.size), system.pattern.row, number[system.pattern.columns_of()]
+    # which unknowns the rows of a component read
     reads = (of_row >= first) & (of_column >= 0)
     some = int(component.max(initial=-1)) + 1
     size = (some, places.size)
@@ -154,11 +159,13 @@ def _pattern(system: System, selection: Selection, places: Ints) -> tuple[Ints, 
     read = csc_array((ones, (component[of_row[reads] - first], of_column[reads])), shape=size)
     slopes = selection.rate > 0
     gives = (number[selection.unknown[slopes]], component[solved + np.flatnonzero(slopes)])
+    # which rates a component gives
     give = csc_array((np.ones(gives[0].size), gives), shape=(places.size, some))
     flows = (number[system.form.k_q], number[system.form.k_f])
     own = csc_array((np.ones(places.size), (every, every)), shape=(places.size, places.size))
     kinematic = csc_array((np.ones(flows[0].size), flows), shape=(places.size, places.size))
     slopes_of, read_by = np.diff(give.indptr), np.bincount(read.indices, minlength=some)
+    # nearly full: other forms keep it sparse
     if float((slopes_of.astype(float) * read_by).sum()) > LARGEST:
         raise NoSuchForm(
             f"the Jacobian of the underlying equation has more than {LARGEST} entries: inertia or constraints couple "
@@ -180,16 +187,19 @@ def state_jacobian(tables_: Tables, system: System, t: float, y: Floats, yd: Flo
     assert tables_.state is not None
     chosen, places = tables_.state.selection, tables_.state.places
     jy, jyd = system.jacobian(t, y, yd)
+    # entries of the matrix by rates, or by multipliers
     values = np.where(chosen.from_rate > 0, jyd[chosen.source], jy[chosen.source])
     solved, first, n = chosen.unknown.size, system.form.kinematics, places.size
     number = np.full(system.unknowns, -1, dtype=np.int64)
     number[places] = np.arange(n)
     columns = system.pattern.columns_of()
     take = (system.pattern.row >= first) & (number[columns] >= 0)
+    # derivatives of the rows by the state
     reads = np.zeros((solved, n))
     np.add.at(reads, (system.pattern.row[take] - first, number[columns[take]]), jy[take])
     matrix = csc_array((values, chosen.pattern.row, chosen.pattern.column), shape=(solved, solved))
     slopes = splu(matrix).solve(reads)
+    # cj of each state, the slopes of its rate, and q' = f
     full = cj * np.eye(n)
     moved = chosen.rate > 0
     full[number[chosen.unknown[moved]]] += slopes[moved]

@@ -11,8 +11,8 @@ from typing import Any
 import numpy as np
 from sysdyn.cli.export.layout import Formed
 from sysdyn.cli.export.tables import Tables
-from sysdyn.compiler.binding.manifest import named, where
-from sysdyn.compiler.model.mirror import letter, spelled, word
+from sysdyn.compiler.binding.manifest import family_entry, where
+from sysdyn.compiler.model.mirror import family_name, letter, word
 from sysdyn.dsl.text.diagnostics import Place
 from sysdyn.runtime.model import description
 from sysdyn.runtime.model.description import BASE, BESIDE, Family, RowFamily
@@ -28,22 +28,24 @@ def unknowns(formed: Formed, *, si: bool = False) -> list[dict[str, Any]]:
     moving = system.differential(system.jacobian(formed.state.t, y, yd)[1])
     found: list[dict[str, Any]] = []
     place = 0
+    # in the order of y, of the explicit form states alone
     for k, family in enumerate(families):
         if family.kind in BESIDE or (state and family.kind not in ("q", "f", "p", "s")):
             continue
         first = int(system.form.at[k])
         differential = state or family.kind == "q" or bool(np.any(moving[first : first + family.size]))
         kind = letter(formulation, family.kind)
-        name = spelled(formulation, family.name, family.kind)
+        name = family_name(formulation, family.name, family.kind)
         plain = {"kind": kind, "unit": form.families[k].unit, "differential": differential}
         for own, size in _entries(name, family):
-            found.append({**own, **plain, **(_at(place, size) if si else {})})
+            found.append({**own, **plain, **(_slice_entry(place, size) if si else {})})
             place += size
+    # the multipliers nu that index 2 adds
     for k in system.description.families_of("kappa") if system.unknowns > system.form.written else ():
         family = families[k]
         plain = {"kind": "nu", "unit": _nu_unit(formed, k), "differential": False}
         for own, size in _entries(nu_name(family.name), family):
-            found.append({**own, **plain, **(_at(place, size) if si else {})})
+            found.append({**own, **plain, **(_slice_entry(place, size) if si else {})})
             place += size
     return found
 
@@ -51,7 +53,7 @@ def unknowns(formed: Formed, *, si: bool = False) -> list[dict[str, Any]]:
 def _entries(name: str, family: Family) -> list[tuple[dict[str, Any], int]]:
     """What says a family, and its size; one by one where the author wrote its elements so."""
     if not family.elements:
-        return [(named(name, family.shape), family.size)]
+        return [(family_entry(name, family.shape), family.size)]
     return [({"name": family.named(k, name)}, 1) for k in range(family.size)]
 
 
@@ -64,7 +66,7 @@ def _nu_unit(formed: Formed, kappa: int) -> str:
     return f"({units.pop()})^2/(s.({of_phi.pop()}))" if len(units) == len(of_phi) == 1 else ""
 
 
-def _at(place: int, size: int) -> dict[str, int]:
+def _slice_entry(place: int, size: int) -> dict[str, int]:
     return {"place": place, "size": size}
 
 
@@ -80,7 +82,7 @@ def elements(formed: Formed) -> tuple[str, ...]:
         name = system.name(place)
         if family >= 0 and formulation.startswith("co_"):
             head, bracket, index = name.partition("[")
-            name = spelled(formulation, head, kind) + bracket + index
+            name = family_name(formulation, head, kind) + bracket + index
         names.append(name)
     return tuple(names)
 
@@ -90,7 +92,9 @@ def rows(formed: Formed) -> list[dict[str, Any]]:
     form, system, formulation = formed.prepared.compiled.form, formed.system, formed.prepared.formulation
     families = system.description.families
     found: list[dict[str, Any]] = []
+    # a slope for each state
     if system.form.name == "0":
+        # q' = f, then groups as the form has them
         for k, family in enumerate(families):
             if family.kind in ("q", "f", "p", "s"):
                 found += _labels(family.name, family, "slope", form.families[k].place)
@@ -108,7 +112,7 @@ def rows(formed: Formed) -> list[dict[str, Any]]:
 def _labels(name: str, family: Family | RowFamily, kind: str, place: Place | None) -> list[dict[str, Any]]:
     """Entries of the rows of a family: one, or one for each element that the author wrote."""
     if not family.elements:
-        said = named(name, family.shape)
+        said = family_entry(name, family.shape)
         return [{"label": said.pop("name"), **said, "kind": kind, **where(place)}]
     each = (description.named(name, family.shape, family.elements, k) for k in range(family.size))
     return [{"label": label, "kind": kind, "file": file, "line": line} for label, file, line in each]

@@ -146,10 +146,10 @@ def sd_mass(t: float, y: Any, yd: Any, p: Any = None) -> _Floats:
 
 def sd_follow(p: Any) -> _Floats:
     """The parameters p with what follows from others (param b = 2*a) and constants of integrated rows written anew."""
-    return _followed(np.array(_model().parameters(p)), [])
+    return _apply_following(np.array(_model().parameters(p)), [])
 
 
-def _followed(p: _Floats, replaced: list[tuple[slice, _Floats]]) -> _Floats:
+def _apply_following(p: _Floats, replaced: list[tuple[slice, _Floats]]) -> _Floats:
     """What follows written into p, in the order in which it is used; what is replaced does not follow."""
     m = _model()
     y = np.zeros(m.tables["followed"] + 1)
@@ -165,7 +165,7 @@ def parameters(**changed: float) -> _Floats:
     known = {item["name"]: slice(item["place"], item["place"] + item["size"]) for item in m.said["parameters"]}
     for name, value in changed.items():
         p[known[name]] = np.ravel(value)
-    return _followed(m.parameters(p), [(known[name], p[known[name]].copy()) for name in changed])
+    return _apply_following(m.parameters(p), [(known[name], p[known[name]].copy()) for name in changed])
 
 
 def sd_outputs(t: float, y: Any, yd: Any, p: Any = None) -> _Floats:
@@ -175,11 +175,14 @@ def sd_outputs(t: float, y: Any, yd: Any, p: Any = None) -> _Floats:
     tables = m.tables
     if not m.said["outputs"]:
         return np.zeros(0)
+    # rates and multipliers are solved for first
     if m.state is not None:
         y, yd = _slopes(m, t, y, p)
     written = tables["written"]
+    # the unknowns as the rows of outputs want them
     inside, rates = np.zeros((2, max(tables["system"]["extended"], written)))
     inside[:written], rates[:written] = y[:written], yd[:written]
+    # ledgers are integrals of a run: not known at one instant
     meters = np.full(7, np.nan)
     if tables["audit"] is not None:
         found = np.zeros(tables["audited"])
@@ -347,8 +350,10 @@ class _Seeking:
     def attempt(self, use: NDArray[np.int_], free: NDArray[np.int_]) -> bool:
         """Whether the rows hold at self.x afterwards; else it is what it was."""
         x, base, now = self.x.copy(), self.guess, np.inf
+        # Gauss-Newton: the least change from the guess that meets the rows
         for m in range(_ITERATIONS):
             a = self.matrix(x)[np.ix_(use, free)]
+            # rows are judged by the size of their terms
             size = np.abs(a) @ np.asarray(self.tables["scale"])[free]
             size = np.where(size > 0.0, size, 1.0)
             r = self.rows(x)[use]
@@ -358,11 +363,13 @@ class _Seeking:
             a = a * self.unit[free]
             norm = np.linalg.norm(a, axis=1)
             norm = np.where(norm > 0.0, norm, 1.0)
+            # from where the change is counted, not from the last iterate
             aim = a @ ((x - base)[free] / self.unit[free]) - r
             if not np.isfinite(aim).all():
                 break
             trial = x.copy()
             trial[free] = base[free] + self.unit[free] * np.linalg.lstsq(a / norm[:, None], aim / norm, _RANK)[0]
+            # half the step until it comes nearer
             for _ in range(_HALVINGS):
                 reached = _largest(self.rows(trial)[use] / size)
                 nearer = reached < now or (m == 0 and now < _HELD and np.isfinite(reached))
@@ -371,6 +378,7 @@ class _Seeking:
                 trial = x + 0.5 * (trial - x)
             if nearer:
                 x, now = trial, reached
+            # again, counted from here
             elif base is self.guess:  # rows of terms that are small beside all of u: the least change
                 base = x
             else:

@@ -7,7 +7,7 @@ is given anew are the initial values, by formulas.
 from __future__ import annotations
 
 import numpy as np
-from sysdyn.cli.export.tables import Stage, Start, assembled
+from sysdyn.cli.export.tables import Stage, Start, assembly_tables
 from sysdyn.runtime.model.description import Floats, Ints
 from sysdyn.runtime.model.system import System
 from sysdyn.runtime.start.least import problem_of
@@ -26,7 +26,7 @@ def start_tables(system: System, state: ConsistentState) -> Start | None:
     x = starter.unknowns(state.t, state.y, state.yd)
     problem = problem_of(starter, state.t, x, x, rows=starter.every, free=starter.free)
     return Start(
-        assembled(starter.settled),
+        assembly_tables(starter.settled),
         starter.n,
         starter.rates.astype(np.int32),
         np.flatnonzero(starter.written[: starter.n]).astype(np.int32),

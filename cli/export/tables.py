@@ -153,13 +153,14 @@ class Tables:
     audit_at: Ints
 
 
-def assembled(system: System) -> Assembled:
+def assembly_tables(system: System) -> Assembled:
     """The tables of a system."""
     form, slots = system.form, system.slots
     calls = tuple(
         Call(planned.block, planned.at, planned.to, slots[2 * k + 2], slots[2 * k + 3])
         for k, planned in enumerate(form.calls)
     )
+    # rows that a held unknown replaces
     held_row, held_unknown = system.held
     cleared = np.flatnonzero(np.isin(system.pattern.row, held_row)).astype(np.int32)
     return Assembled(

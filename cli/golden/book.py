@@ -98,6 +98,7 @@ def read(folder: Path) -> tuple[Golden, ...]:
 
 
 def _entry(folder: Path, model: Path, name: str, item: dict[str, Any]) -> Golden:
+    """A golden of the book's table; raises ValueError, KeyError or TypeError where it is damaged."""
     if Path(name).name != name or name in ("", ".", ".."):
         raise ValueError(f"'{name}' is no name of a scene")
     numbers = {k: float(item[k]) for k in ("rtol", "atol", "tau", "accuracy", "error", "energy", "constraints")}
@@ -143,6 +144,7 @@ def write(golden: Golden) -> None:
 
 
 def _lines(g: Golden) -> list[str]:
+    """Lines of golden.toml about one golden, numbers as they are read back."""
     lines = [
         f"[scenes.{toml_text(g.name)}]",
         f"scene = {toml_text(g.scene)}",

@@ -9,9 +9,9 @@ from html import escape
 
 from sysdyn.cli.compare.diffing import differences, headline, table
 from sysdyn.cli.golden.book import Golden
-from sysdyn.cli.golden.checking import Case, loaded, tolerance_of
+from sysdyn.cli.golden.checking import Case, load_golden, tolerance_of
 from sysdyn.cli.golden.recording import Recorded
-from sysdyn.cli.golden.structures import changed
+from sysdyn.cli.golden.structures import describe_change
 from sysdyn.cli.page.document import document
 from sysdyn.cli.page.document import table as html_table
 from sysdyn.runtime.comparison.verdict import Incomparable
@@ -24,32 +24,36 @@ BESIDE = ("structure", "meter", "run")
 def what_changed(golden: Golden, wanted: Golden, found: Recorded) -> tuple[str | None, str]:
     """(one line, all of it) of what differs between what is kept and what was found; None: nothing."""
     lines, first = [], None
+    # the traces
     try:
-        verdict = differences(loaded(golden), found.trace, tolerance_of(golden))
+        verdict = differences(load_golden(golden), found.trace, tolerance_of(golden))
         if not verdict.equal:
             first = headline(verdict)
             lines += [first, table(verdict)]
     except (Incomparable, TraceError, OSError) as error:
         first = f"{error.filename}: {error.strerror}" if isinstance(error, OSError) else str(error)
         lines.append(first)
+    # the facts of structure, formulation by formulation
     try:
         kept = json.loads(golden.structure.read_text(encoding="utf-8"))["formulations"]
     except (OSError, ValueError, KeyError, TypeError) as error:
         kept = {}
         lines.append(f"{golden.structure}: {error}")
     new = json.loads(json.dumps(found.structure))
+    # what is new, gone or another
     for name in dict.fromkeys((*kept, *new)):
         if name not in kept or name not in new:
             lines.append(f"formulation {name} is {'new' if name in new else 'gone'}")
             continue
         facts = dict.fromkeys((*kept[name], *new[name]))
         lines += [
-            f"{name}: {changed(k, kept[name].get(k), new[name].get(k))}"
+            f"{name}: {describe_change(k, kept[name].get(k), new[name].get(k))}"
             for k in facts
             if kept[name].get(k) != new[name].get(k)
         ]
     if wanted.rtol != golden.rtol:
         lines.append(f"rtol {golden.rtol:g} becomes {wanted.rtol:g}")
+    # bounds of ledgers that grow a lot
     for name in ("energy", "constraints"):
         before, after = getattr(golden, name), getattr(found, name)
         if after > 10.0 * before:

@@ -16,7 +16,7 @@ from sysdyn.cli.compare.diffing import as_json, cases, common, differences, head
 from sysdyn.cli.failures import UsageError
 from sysdyn.cli.golden.book import Golden
 from sysdyn.cli.golden.runs import Run, Stopped, between, run
-from sysdyn.cli.golden.structures import changed
+from sysdyn.cli.golden.structures import describe_change
 from sysdyn.cli.run.request.asked import Request
 from sysdyn.runtime.comparison.arrays import Arrays
 from sysdyn.runtime.comparison.curve import Floats
@@ -83,7 +83,7 @@ def request_of(golden: Golden, **options: Any) -> Request:
     return Request(str(golden.model), **(known | named | options))
 
 
-def loaded(golden: Golden) -> Arrays:
+def load_golden(golden: Golden) -> Arrays:
     """The kept trace.  Raises TraceError, Incomparable, OSError."""
     golden.trace.open("rb").close()
     with Recorded(golden.trace) as source:
@@ -127,34 +127,40 @@ def check(
 
 
 def _case(golden: Golden, formulation: str, method: str, backend: str, with_page: bool) -> Case:
+    """Run one formulation, method and backend of a golden and compare; what stops it is the case's message and exit
+    code.
+    """
     began = time.monotonic()
 
-    def stopped(code: int, message: str) -> Case:
+    def stopped_case(code: int, message: str) -> Case:
         seconds = time.monotonic() - began
         wrong = (("run", message),)
         return Case(golden.label, formulation, method, backend, code, message, np.inf, None, None, seconds, wrong)
 
+    # what is kept
     try:
-        kept = loaded(golden)
+        kept = load_golden(golden)
         structure = structure_of(golden, formulation)
     except (Incomparable, TraceError) as error:
-        return stopped(INPUT_OUTPUT, str(error))
+        return stopped_case(INPUT_OUTPUT, str(error))
     except OSError as error:
-        return stopped(INPUT_OUTPUT, f"{error.filename}: {error.strerror}")
+        return stopped_case(INPUT_OUTPUT, f"{error.filename}: {error.strerror}")
+    # the run
     try:
         options = {"formulation": formulation, "backend": backend, "method": method or None}
         one = run(request_of(golden, **options), between(kept.time))
         verdict = _verdict(golden, kept, one, structure)
     except Stopped as error:
-        return stopped(error.code, str(error))
+        return stopped_case(error.code, str(error))
     except UsageError as error:  # the golden asks, nobody typed it: its scene is gone
-        return stopped(DIFFERENT, error.message)
+        return stopped_case(DIFFERENT, error.message)
     except OSError as error:
-        return stopped(INPUT_OUTPUT, f"{error.filename}: {error.strerror}")
+        return stopped_case(INPUT_OUTPUT, f"{error.filename}: {error.strerror}")
     except TraceError as error:
-        return stopped(INPUT_OUTPUT, str(error))
+        return stopped_case(INPUT_OUTPUT, str(error))
     except Incomparable as error:
-        return stopped(SOLVER, f"the traces cannot be compared: {error}")
+        return stopped_case(SOLVER, f"the traces cannot be compared: {error}")
+    # structure and ledgers before traces: they say more
     wrong = [*_structural(structure, one.structure), *_meters(golden, one)]
     judged = (*wrong, *cases(verdict))
     failed = next((text for _, text in wrong if text is not None), None)
@@ -162,6 +168,7 @@ def _case(golden: Golden, formulation: str, method: str, backend: str, with_page
     worst = verdict.worst
     different = not verdict.equal or failed is not None
     page = ""
+    # a page with pictures of what differs
     if with_page and different:
         from sysdyn.cli.compare.comparison_page import section
 
@@ -197,7 +204,7 @@ def _structural(kept: dict[str, Any], found: dict[str, Any]) -> list[tuple[str, 
     """(fact, what differs) of each fact of the structure."""
     found = json.loads(json.dumps(found))
     facts = [(name, kept.get(name), found.get(name)) for name in dict.fromkeys((*kept, *found))]
-    return [(f"structure: {name}", None if a == b else changed(name, a, b)) for name, a, b in facts]
+    return [(f"structure: {name}", None if a == b else describe_change(name, a, b)) for name, a, b in facts]
 
 
 def _meters(golden: Golden, one: Run) -> list[tuple[str, str | None]]:
@@ -215,12 +222,14 @@ def _meters(golden: Golden, one: Run) -> list[tuple[str, str | None]]:
 
 def mutate(golden: Golden) -> Iterator[Mutant]:
     """Each parameter of the scene changed by SHARE: does the golden notice?  Raises Stopped where no run succeeds."""
-    kept = loaded(golden)
+    kept = load_golden(golden)
     formulation = golden.formulations[0]
     structure = structure_of(golden, formulation)
     base = run(request_of(golden, formulation=formulation), between(kept.time))
+    # some of the parameters where there are many
     for name in _some(base.parameters):
         value = base.parameters[name]
+        # no share of zero
         if value == 0.0 or not np.isfinite(value):
             yield Mutant(golden.label, name, None, 0.0, f"it is {value:g}: a share of it changes nothing")
             continue
@@ -228,15 +237,18 @@ def mutate(golden: Golden) -> Iterator[Mutant]:
         try:
             one = run(request_of(golden, formulation=formulation, settings=settings), between(kept.time))
             verdict = _verdict(golden, kept, one, structure)
+        # refused: noticed too
         except (Stopped, UsageError, Incomparable) as error:
             message = error.message if isinstance(error, UsageError) else str(error)
             yield Mutant(golden.label, name, True, np.inf, f"the model refuses it: {message}")
             continue
         worst = verdict.worst
         ratio = worst.worst.ratio if worst else 0.0
+        # noticed
         if not verdict.equal:
             yield Mutant(golden.label, name, True, ratio, "")
             continue
+        # not noticed: because nothing traced depends on it, or because the tolerance is wide
         effect = _effect(base, one, tolerance_of(golden))
         insensitive = effect < NO_EFFECT
         reason = f"it moves no traced quantity by more than {effect:.2g} of its limit: " + (
@@ -262,12 +274,12 @@ def _some(parameters: dict[str, float]) -> list[str]:
 def _effect(base: Run, mutant: Run, tolerance: Tolerance) -> float:
     """How far the change moves the traces at the instants that both hold, in limits."""
     instants = np.intersect1d(base.trace.time, mutant.trace.time)
-    one, two = (_at(r.trace, instants) for r in (base, mutant))
+    one, two = (_rows_at(r.trace, instants) for r in (base, mutant))
     worst = differences(one, two, tolerance.part(NO_EFFECT)).worst
     return NO_EFFECT * worst.worst.ratio if worst else 0.0
 
 
-def _at(trace: Arrays, instants: Floats) -> Arrays:
+def _rows_at(trace: Arrays, instants: Floats) -> Arrays:
     rows = np.searchsorted(trace.time, instants)
     values, rates = ({n: v[rows] for n, v in of.items()} for of in (trace.values, trace.rates))
     return Arrays(instants, values, rates, list(trace.quantities.values()), trace.events, trace.time_unit)

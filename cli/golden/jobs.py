@@ -26,12 +26,12 @@ class Asked:
     with_page: bool
 
 
-def checked(asked: Asked) -> list[Case]:
+def check_golden(asked: Asked) -> list[Case]:
     """The cases of a golden."""
     return list(check(asked.golden, asked.formulations, asked.methods, asked.backends, asked.with_page))
 
 
-def mutated(golden: Golden) -> tuple[list[Mutant], tuple[int, str] | None]:
+def mutate_golden(golden: Golden) -> tuple[list[Mutant], tuple[int, str] | None]:
     """The mutants of a golden, as many as could be made; exit code and reason where they could not all be."""
     found: list[Mutant] = []
     try:
@@ -43,7 +43,7 @@ def mutated(golden: Golden) -> tuple[list[Mutant], tuple[int, str] | None]:
     return found, None
 
 
-def renewed(golden: Golden) -> tuple[list[str], Recorded | tuple[int, str]]:
+def record_again(golden: Golden) -> tuple[list[str], Recorded | tuple[int, str]]:
     """What is said while a golden is recorded anew, and the record; exit code and reason where there is none."""
     said: list[str] = []
     only = golden.formulations[0] if len(golden.formulations) == 1 else None
@@ -59,7 +59,7 @@ def renewed(golden: Golden) -> tuple[list[str], Recorded | tuple[int, str]]:
 
 
 def in_processes(
-    asked: Sequence[Asked], jobs: int | None, checked: Callable[[Asked], list[Case]] = checked
+    asked: Sequence[Asked], jobs: int | None, checked: Callable[[Asked], list[Case]] = check_golden
 ) -> Iterator[list[Case]]:
     """The cases of each golden, in their order; checked: what makes them, in another process perhaps."""
     began = time.monotonic()

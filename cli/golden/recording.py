@@ -83,6 +83,7 @@ def record(request: Request, rtol: float, atol: float, say: Say, jobs: int | Non
 
     Raises Refused, Stopped, UsageError.
     """
+    # finer references until the own error is a tenth of the tolerance
     for share in REFERENCE:
         try:
             base, runs, golden = _reference(request, max(rtol * share, FINEST), rtol, atol, say)
@@ -98,6 +99,7 @@ def record(request: Request, rtol: float, atol: float, say: Say, jobs: int | Non
             continue
     refused: Refused | None = None
     wanted = _every(request, base)
+    # wider time tolerances where events move
     for tau in (first, *wider):
         tolerance = Tolerance(rtol, atol, tau)
         if refused is not None:
@@ -109,11 +111,13 @@ def record(request: Request, rtol: float, atol: float, say: Say, jobs: int | Non
             break
         except Refused as error_:
             refused = refused or error_
+    # none of them would do
     else:
         assert refused is not None
         raise refused
     for claim in base.claims:
         say(f"{claim}; a golden holds what is, right or wrong")
+    # bounds of ledgers, from all runs
     meters = [base, *runs, *found, *_others(request, base, checked)]
     return Recorded(
         golden,
@@ -146,6 +150,7 @@ def _reference(request: Request, accuracy: float, rtol: float, atol: float, say:
         raise Refused("the scene traces nothing: a golden trace needs quantities")
     golden = _thin(base, rtol, atol)
     also = between(golden.time)
+    # more instants where the curve between those that are kept is off
     for _ in range(DENSER):
         dense = also
         base = run(replace(request, accuracy=accuracy), dense)
@@ -154,10 +159,12 @@ def _reference(request: Request, accuracy: float, rtol: float, atol: float, say:
         if not untold.any():
             break
         time = base.trace.time
+        # between which instants
         cells = np.flatnonzero((untold[1:] | untold[:-1]) & (np.diff(time) > FEW * APART * (time[-1] - time[0])))
         also = np.concatenate([time, *(np.linspace(time[k], time[k + 1], FEW + 1)[1:-1] for k in cells)])
     rows = f"{golden.time.size} of {base.trace.time.size} instants"
     say(f"reference: {base.formulation}, {base.method}, accuracy {accuracy:.0e}, {rows}")
+    # the same at a finer accuracy, and by another method
     runs = [run(replace(request, accuracy=max(accuracy * FINER, FINEST)), dense)]
     other = "bdf" if base.method == "radau" else "radau"
     try:
@@ -266,19 +273,22 @@ def _formulations(
         for wanted in every:
             name = wanted.formulation or ""
             ran = next(made) if accuracy == first else _one((wanted, accuracy, golden.time))
+            # its process died
             if isinstance(ran, Lost):
                 raise RuntimeError(f"the process of {name} died ({ran.how})")
+            # not run: inexpressible ones are left out, others refuse the record
             if isinstance(ran, tuple):
                 code, message, finding = ran
                 if wanted.method or finding.startswith("E60") or finding == "N608":
                     continue  # not expressible
                 text = f"{name}: {message}; --formulation {base.formulation} leaves it out"
                 raise Refused(text) from Stopped(code, message, finding)
-            verdict = _within(ran, golden, tolerance)
+            verdict = _differences_from(ran, golden, tolerance)
+            # finer, until it is well within
             while verdict.worst is not None and _margin(verdict) > HALF and accuracy > tolerance.rtol * CHECKED / 50.0:
                 accuracy /= 10.0
                 ran = run(replace(wanted, accuracy=accuracy), between(golden.time))
-                verdict = _within(ran, golden, tolerance)
+                verdict = _differences_from(ran, golden, tolerance)
             if _margin(verdict) > HALF:
                 assert verdict.worst is not None
                 raise Refused(f"{name} differs from {base.formulation}: {sentence(verdict.worst)}")
@@ -297,7 +307,7 @@ def _one(asked: tuple[Request, float, Floats]) -> Run | tuple[int, str, str]:
         return stopped.code, str(stopped), stopped.finding
 
 
-def _within(one: Run, golden: Arrays, tolerance: Tolerance) -> Verdict:
+def _differences_from(one: Run, golden: Arrays, tolerance: Tolerance) -> Verdict:
     return differences(common(golden, set(one.trace.values)), one.trace, tolerance.part(HALF))
 
 

@@ -67,6 +67,7 @@ def run(request: Request, also: Floats | None = None) -> Run:
     ran = _ran(request, report, also)
     later = (*OF_CLAIMS, *OF_RUNS)  # claims are judged by `simulate`, at the scene's own accuracy
     errors = [d for d in report.diagnostics if d.severity == "error" and (ran is None or d.code not in later)]
+    # no run: the first error, or the note of what is planned
     if ran is None or errors:
         first = next(iter(errors), None)
         where = f"{first.place.file}:{first.place.start[0]}: " if first and first.place else ""
@@ -74,8 +75,10 @@ def run(request: Request, also: Floats | None = None) -> Run:
             note = next(iter(report.diagnostics), None)
             raise Stopped(1, note.message if note else "the model has errors", note.code if note else "")
         raise Stopped(1, f"{where}{first.code}: {first.message}", first.code)
+    # it stopped
     if ran.failure:
         raise Stopped(3, ran.failure)
+    # it ended, and is not met
     if not ran.outcome.met:
         unmet = next(d for d in report.diagnostics if d.code in OF_RUNS)
         raise Stopped(3, unmet.message, unmet.code)
@@ -96,7 +99,7 @@ def _largest(values: Floats) -> float:
 
 def _ran(request: Request, report: Report, also: Floats | None) -> Ran | None:
     """As `cli.running.run`, but the trace holds the steps and the instants that are wanted here."""
-    target = targets.asked(request, report)
+    target = targets.target_of(request, report)
     if target is None:
         return None
     prepared = ready(request, target, report)

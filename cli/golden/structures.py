@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 
-def changed(name: str, kept: Any, found: Any) -> str:
+def describe_change(name: str, kept: Any, found: Any) -> str:
     """What changed in one fact: the numbers, or the first lines that are not in the other."""
     if not (isinstance(kept, list) and isinstance(found, list)):
         return f"{name} is {found}, recorded {kept}"

@@ -25,6 +25,7 @@ def write_trace(path: Path, trace: Arrays, attributes: Mapping[str, str | float 
 
 
 def _written(path: Path, trace: Arrays, attributes: Mapping[str, str | float | int], packed: bool, most: float) -> int:
+    """Write a trace beside its place and put it there where it has at most `most` bytes; its size."""
     import h5py
     from sysdyn.runtime.trace import hdf5
 
@@ -35,6 +36,7 @@ def _written(path: Path, trace: Arrays, attributes: Mapping[str, str | float | i
                 hdf5.say(file.id, {**attributes, "final": 1})
                 time = _data(file, packed, "time", trace.time, "s", "time")
                 time.make_scale("time")
+                # each quantity with unit, nominal value, and its rate where there is one
                 for name, values in trace.values.items():
                     about = trace.quantities[name]
                     data = _data(file, packed, name, values, about.unit, name)
@@ -45,6 +47,7 @@ def _written(path: Path, trace: Arrays, attributes: Mapping[str, str | float | i
                         rate = f"/derivatives/{name}"
                         _data(file, packed, rate, trace.rates[name], unit, f"time derivative of {name}")
                         hdf5.say(data.id, {"derivative": rate})
+                # instants and names of events
                 if trace.events:
                     _data(file, packed, "/events/time", np.array([e.time for e in trace.events]), "s", "time of events")
                     names = np.array([e.name.encode() for e in trace.events])

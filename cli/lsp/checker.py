@@ -15,7 +15,7 @@ from typing import Any
 from sysdyn.cli.console import ROUTINE
 from sysdyn.cli.failures import classify
 from sysdyn.cli.run.check.checking import Checked, file_checked
-from sysdyn.dsl.text.diagnostics import Diagnostic, Report, shortened
+from sysdyn.dsl.text.diagnostics import Diagnostic, Report, limit_findings
 from sysdyn.dsl.text.source import UNSAVED, real
 
 DELAY = 0.15
@@ -170,7 +170,7 @@ def accounts(name: str) -> Accounts:
     return told
 
 
-def shown(result: Checked) -> list[Diagnostic]:
+def visible_findings(result: Checked) -> list[Diagnostic]:
     """The findings that `check` shows."""
-    kept = shortened(Report(result.found).diagnostics)
+    kept = limit_findings(Report(result.found).diagnostics)
     return [d for d in kept if d.severity == "error" or d.code not in ROUTINE]

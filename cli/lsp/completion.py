@@ -14,7 +14,7 @@ from sysdyn.dsl.model import units
 from sysdyn.dsl.model.functions import FUNCTIONS
 from sysdyn.dsl.names.laws import ONE_PORTS, TWO_PORTS
 from sysdyn.dsl.names.names import VALUES
-from sysdyn.dsl.parser.parse import expected
+from sysdyn.dsl.parser.parse import expected_words
 from sysdyn.dsl.text.source import SourceText, Span
 from sysdyn.dsl.tree import syntax
 
@@ -37,28 +37,36 @@ _DOMAINS = ("node", "port", "branch", "coord", "cocoord")
 def complete(document: Document, offset: int) -> list[dict[str, Any]]:
     """What may stand at a place, the nearest first."""
     source = document.source
+    # in a remark or a text
     if sight.quiet(document, offset):
         return []
     line, _ = source.position(offset)
     before = source.text[source.line_starts[line - 1] : offset]
     begun = _BEGUN.search(before)
     start = offset - (len(begun[0]) if begun else 0)
+    # from M import |
     if (match := _IMPORT.match(before)) is not None:
         module = sight.module_of(source, tuple(match[1].split(".")))
-        return [] if module is None else [_named(d) for d in outline.items(module)]
+        return [] if module is None else [_item_of(d) for d in outline.items(module)]
+    # from |
     if (match := _FROM.match(before)) is not None:
         return _modules(match[1])
     statement = re.split(r"[;{}]", before)[-1]
+    # 3 |: a unit
     if _NUMBER.search(statement):
         return _units()
+    # motor.|: its members
     if (path := sight.path_before(source, start)) and (owner := sight.owner_of(document, path, offset)) is not None:
         return _members(document, path, owner, offset)
+    # coord x: |, param k: |
     if (match := _DECLARED.match(statement)) is not None:
         return _domains(document) if match[1] in _DOMAINS else _units()
     inside = isinstance(sight.item_at(document, offset), (syntax.Model, syntax.Component))
-    words = expected(SourceText(source.name, source.text[:start]))
+    words = expected_words(SourceText(source.name, source.text[:start]))
+    # R1: |
     if inside and (match := _LABEL.match(statement)) is not None and match[1] not in words:
         return _components(document)
+    # anywhere else: arguments of an element, words and names
     return [*_arguments(document, statement), *_expression(document, offset, words)]
 
 
@@ -71,7 +79,7 @@ def _item(label: str, kind: int, detail: str = "", doc: str = "") -> dict[str, A
     return found
 
 
-def _named(d: Declared) -> dict[str, Any]:
+def _item_of(d: Declared) -> dict[str, Any]:
     kinds = {"component": CLASS, "function": FUNCTION, "table": FUNCTION, "const": CONSTANT, "parameter": CONSTANT}
     return _item(d.name, kinds.get(d.kind, VARIABLE), f"{d.kind} {d.of}".strip(), d.doc)
 
@@ -85,17 +93,17 @@ def _modules(head: str) -> list[dict[str, Any]]:
 
 
 def _units() -> list[dict[str, Any]]:
-    return [_item(name, UNIT, units.si_text(found[0])) for name in units.names() if (found := units.known(name))]
+    return [_item(name, UNIT, units.si_text(found[0])) for name in units.names() if (found := units.find_unit(name))]
 
 
 def _domains(document: Document) -> list[dict[str, Any]]:
     named = [d for d in sight.of_file(document.tree) if d.kind in ("domain", "bundle")]
-    return [_named(d) for d in named]
+    return [_item_of(d) for d in named]
 
 
 def _members(document: Document, path: tuple[str, ...], owner: Declared, offset: int) -> list[dict[str, Any]]:
     """What follows a dot: the inside of a component, and the variables of power."""
-    inner = [_named(d) for d in sight.members(document, path, offset) if d.kind not in ("index", "energy", "content")]
+    inner = [_item_of(d) for d in sight.members(document, path, offset) if d.kind not in ("index", "energy", "content")]
     own = [_item(name, PROPERTY, LETTERS.get(name.rstrip("12"), "")) for name in sight.letters(document, owner)]
     return _once([*own, *inner])
 
@@ -105,7 +113,7 @@ def _components(document: Document) -> list[dict[str, Any]]:
     from sysdyn.cli.manual import library
 
     found = [_item(name, KEYWORD, "element of the language") for name in (*ONE_PORTS, *TWO_PORTS)]
-    found += [_named(d) for d in sight.of_file(document.tree) if d.kind == "component"]
+    found += [_item_of(d) for d in sight.of_file(document.tree) if d.kind == "component"]
     known = {item["label"] for item in found}
     for entry in library.entries():
         if entry.kind == "component" and entry.name not in known and entry.module != library.PRELUDE:
@@ -116,18 +124,18 @@ def _components(document: Document) -> list[dict[str, Any]]:
 
 def _import(document: Document, module: str, name: str) -> dict[str, Any]:
     """The change that imports a name: behind those of the same module, or in a line of its own."""
-    from sysdyn.cli.lsp.findings import replaced
+    from sysdyn.cli.lsp.findings import text_edit
 
     imports = [i for i in document.tree.items if isinstance(i, syntax.Import)]
     for item in imports:
         if item.module.names == ("std", module) and item.names:
             end = item.names[-1].span.end
-            return replaced(document.source, Span(end, end), f", {name}")
+            return text_edit(document.source, Span(end, end), f", {name}")
     ends = [document.source.position(i.span.start)[0] for i in imports]
     first = min((i.span.start for i in document.tree.items), default=0)
     line = ends[-1] + 1 if ends else 1
     at = document.source.line_starts[line - 1] if line <= len(document.source.line_starts) else first
-    return replaced(document.source, Span(at, at), f"from std.{module} import {name}\n")
+    return text_edit(document.source, Span(at, at), f"from std.{module} import {name}\n")
 
 
 def _arguments(document: Document, statement: str) -> Iterator[dict[str, Any]]:
@@ -139,15 +147,15 @@ def _arguments(document: Document, statement: str) -> Iterator[dict[str, Any]]:
     if component is not None:
         for d in outline.body(component.place.source, component.body):
             if d.kind in ("parameter", "input"):
-                yield _named(d) | {"insertText": f"{d.name} = "}
+                yield _item_of(d) | {"insertText": f"{d.name} = "}
 
 
 def _expression(document: Document, offset: int, words: frozenset[str]) -> list[dict[str, Any]]:
     """Words of the language that fit, and where no statement begins the names in sight."""
     found = []
     if _FIRST.isdisjoint(words):
-        found += [_named(d) for d in sight.local(document, offset)]
-        found += [_named(d) for d in sight.of_file(document.tree) if d.kind in _READ]
+        found += [_item_of(d) for d in sight.local(document, offset)]
+        found += [_item_of(d) for d in sight.of_file(document.tree) if d.kind in _READ]
         found += [_item(name, FUNCTION, "function") for name in FUNCTIONS if name.isidentifier()]
         found += [_item(name, CONSTANT, "value") for name in VALUES]
     return _once([*found, *(_item(word, KEYWORD) for word in sorted(words))])

@@ -33,7 +33,7 @@ class Document:
         self.accounts: dict[str, dict[str, Any]] = {}
         """What `sysdyn list` tells of each model that has no errors, once the check has found it."""
 
-    def changed(self, changes: Sequence[dict[str, Any]], version: int | None) -> Document:
+    def apply_changes(self, changes: Sequence[dict[str, Any]], version: int | None) -> Document:
         """The document with changes made, each of the text that the one before it left."""
         source = self.source
         for change in changes:
@@ -45,7 +45,7 @@ class Document:
         return Document(self.uri, source.text, version)
 
     @cached_property
-    def parsed(self) -> tuple[syntax.File, tuple[Diagnostic, ...]]:
+    def tree_and_problems(self) -> tuple[syntax.File, tuple[Diagnostic, ...]]:
         """The tree, and what is wrong with its syntax; of a text that is too long an empty one."""
         return parse(SourceText(self.name, "") if self.long else self.source)
 
@@ -57,7 +57,7 @@ class Document:
     @property
     def tree(self) -> syntax.File:
         """The tree of what could be read."""
-        return self.parsed[0]
+        return self.tree_and_problems[0]
 
     @cached_property
     def marks(self) -> Marks:
@@ -93,7 +93,7 @@ class Documents:
         if document is not None:
             UNSAVED.pop(document.key, None)
 
-    def named(self, name: str) -> Document | None:
+    def find_by_name(self, name: str) -> Document | None:
         """The open document of that name."""
         return next((d for d in self._open.values() if d.name == name), None)
 
@@ -103,7 +103,7 @@ class Documents:
 
     def uri_of(self, name: str) -> str:
         """The URI of a text, as the editor wrote it where it holds the text."""
-        document = self.named(name)
+        document = self.find_by_name(name)
         return positions.uri_of(name) if document is None else document.uri
 
     def dependent(self, document: Document) -> list[Document]:

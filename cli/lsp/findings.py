@@ -44,16 +44,16 @@ def actions(document: Document, found: Sequence[Diagnostic], asked: Span, only: 
     """Quick fixes of findings that touch a range, and all safe changes at once where there is one."""
     fixes = [d for d in found if _fits(document, d.edit)]
     listed: list[dict[str, Any]] = []
-    if _wanted("quickfix", only):
+    if _is_wanted("quickfix", only):
         for d in fixes:
             assert d.edit is not None
             spans = [d.edit.place.span, *([d.place.span] if d.place is not None else [])]
             if any(s.start <= asked.end and asked.start <= s.end for s in spans):
                 listed.append(_action(document, _title(d.edit), "quickfix", [d.edit], [diagnostic(d)]))
-    if fixes and _wanted("source.fixAll", only):
-        from sysdyn.cli.run.check.mending import apart
+    if fixes and _is_wanted("source.fixAll", only):
+        from sysdyn.cli.run.check.mending import disjoint_edits
 
-        edits = [d.edit for d in apart(fixes) if d.edit is not None]
+        edits = [d.edit for d in disjoint_edits(fixes) if d.edit is not None]
         listed.append(_action(document, "All safe changes (check --fix)", "source.fixAll", edits, []))
     return listed
 
@@ -64,7 +64,7 @@ def _fits(document: Document, edit: Edit | None) -> bool:
     return source is not None and source.name == document.name and source.text == document.source.text
 
 
-def _wanted(kind: str, only: Sequence[str]) -> bool:
+def _is_wanted(kind: str, only: Sequence[str]) -> bool:
     return not only or any(kind == k or kind.startswith(f"{k}.") for k in only)
 
 
@@ -80,21 +80,21 @@ def _title(edit: Edit) -> str:
 def _action(
     document: Document, title: str, kind: str, edits: list[Edit], mends: list[dict[str, Any]]
 ) -> dict[str, Any]:
-    changes = [replaced(document.source, e.place.span, e.text) for e in edits]
+    changes = [text_edit(document.source, e.place.span, e.text) for e in edits]
     action = {"title": title, "kind": kind, "edit": {"changes": {document.uri: changes}}}
     return action | ({"diagnostics": mends, "isPreferred": True} if mends else {})
 
 
-def replaced(source: SourceText, span: Span, text: str) -> dict[str, Any]:
+def text_edit(source: SourceText, span: Span, text: str) -> dict[str, Any]:
     """The protocol's change of a text."""
     return {"range": positions.range_of(source, span), "newText": text}
 
 
-def formatted(document: Document) -> list[dict[str, Any]] | None:
+def format_edits(document: Document) -> list[dict[str, Any]] | None:
     """The change into the canonical layout, of the lines that differ; None where the text does not parse."""
     from sysdyn.dsl.format.format import format_text
 
-    tree, problems = document.parsed
+    tree, problems = document.tree_and_problems
     if any(d.severity == "error" for d in problems):
         return None
     before, after = document.source.text, format_text(tree)
@@ -105,7 +105,7 @@ def formatted(document: Document) -> list[dict[str, Any]] | None:
     tail = _alike(old[head:][::-1], new[head:][::-1])
     start = sum(map(len, old[:head]))
     end = len(before) - sum(map(len, old[len(old) - tail :]))
-    return [replaced(document.source, Span(start, end), "".join(new[head : len(new) - tail]))]
+    return [text_edit(document.source, Span(start, end), "".join(new[head : len(new) - tail]))]
 
 
 def _alike(old: list[str], new: list[str]) -> int:

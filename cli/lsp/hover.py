@@ -35,8 +35,8 @@ LETTERS = {
 def hover(document: Document, offset: int, found: Sequence[Diagnostic]) -> dict[str, Any] | None:
     """What a word is: its statement, value, unit and comment; then the codes of the findings there."""
     word = sight.word_at(document, offset)
-    parts = [] if word is None else _said(document, word)
-    here = [d for d in found if _at(document, d, offset)]
+    parts = [] if word is None else _descriptions(document, word)
+    here = [d for d in found if _covers(document, d, offset)]
     parts += [_code(code) for code in dict.fromkeys(d.code for d in here)]
     if not parts:
         return None
@@ -46,7 +46,7 @@ def hover(document: Document, offset: int, found: Sequence[Diagnostic]) -> dict[
     return answer
 
 
-def _at(document: Document, d: Diagnostic, offset: int) -> bool:
+def _covers(document: Document, d: Diagnostic, offset: int) -> bool:
     if d.place is None or d.place.source.text != document.source.text or d.place.file != document.name:
         return False
     return d.place.span.start <= offset <= d.place.span.end
@@ -57,14 +57,17 @@ def _code(code: str) -> str:
     return f"**{code}**: {page.title}\n\n{page.why}\n\n`sysdyn explain {code}`"
 
 
-def _said(document: Document, word: sight.Word) -> list[str]:
+def _descriptions(document: Document, word: sight.Word) -> list[str]:
     """What is known of a word, one text for each of its declarations."""
+    # a unit
     if document.marks.unit(word.start):
-        found = units.known(word.name)
+        found = units.find_unit(word.name)
         return [] if found is None else [f"`{word.name}`: {float(found[1]):.12g} {units.si_text(found[0])}"]
     declared = sight.find(document, word)
+    # a name of the text: its declaration
     if declared:
-        return [_told(document, word, d) for d in declared[:4]]
+        return [_describe(document, word, d) for d in declared[:4]]
+    # R1.e: the variable of an element
     if word.path:
         owner = sight.owner_of(document, word.path, word.start)
         letter = word.name.rstrip("12")
@@ -72,8 +75,10 @@ def _said(document: Document, word: sight.Word) -> list[str]:
             unit = _unit(document, word)
             return [f"`{'.'.join((*word.path, word.name))}`: {LETTERS[letter]}{unit}"]
         return []
+    # e, f, q, p in a law
     if word.name.rstrip("12") in sight.OWN and sight.instance_at(document, word.start) is not None:
         return [f"`{word.name}`: {LETTERS[word.name.rstrip('12')]} of the element"]
+    # words of the language
     if word.name in (*ONE_PORTS, *TWO_PORTS):
         return [f"`{word.name}`: an element of the language (`sysdyn help elements`)"]
     if word.name in FUNCTIONS:
@@ -81,7 +86,7 @@ def _said(document: Document, word: sight.Word) -> list[str]:
     return []
 
 
-def _told(document: Document, word: sight.Word, d: Declared) -> str:
+def _describe(document: Document, word: sight.Word, d: Declared) -> str:
     parts = [f"```sd\n{d.text}\n```", f"{d.kind}{_unit(document, word)}{_value(document, word)}"]
     if d.kind == "component":
         parts += _component(d)
@@ -158,6 +163,7 @@ def references(document: Document, offset: int, with_declaration: bool) -> list[
     if word is None or not wanted:
         return []
     found = []
+    # wherever the word stands as a name, and means the same declaration
     for match in re.finditer(rf"(?<!\w){re.escape(word.name)}(?!\w)", document.source.text):
         other = sight.word_at(document, match.start()) if match.start() in document.marks.names else None
         if other is None:
@@ -170,20 +176,25 @@ def references(document: Document, offset: int, with_declaration: bool) -> list[
     return found
 
 
-def renamed(document: Document, offset: int, name: str) -> dict[str, Any]:
+def rename_edits(document: Document, offset: int, name: str) -> dict[str, Any]:
     """The change that gives the word under the cursor another name in this text; ValueError where that cannot be."""
     word = sight.word_at(document, offset)
     declared = [] if word is None else sight.find(document, word)
+    # nothing of this text under the cursor
     if word is None or not declared:
         raise ValueError("there is no name of the text to be changed here")
-    if any(d.severity == "error" for d in document.parsed[1]):
+    # names in unreadable lines would stay
+    if any(d.severity == "error" for d in document.tree_and_problems[1]):
         raise ValueError("the text has errors of syntax: names in what cannot be read would be left")
+    # declared in another file
     if any(d.place.source is not document.source for d in declared):
         raise ValueError(f"'{word.name}' is declared in {declared[0].place.file}")
+    # no name at all, or one of the language
     if not name.isidentifier() or name in words():
         raise ValueError(f"'{name[:60]}' cannot be a name")
     if name in PREDEFINED:
         raise ValueError(f"'{name}' cannot be a name: the language has it already")
+    # a name that is there already
     other = sight.Word(word.path, name, declared[0].place.span.start, declared[0].place.span.start)
     if sight.find(document, other):
         raise ValueError(f"'{name}' is declared already")

@@ -26,14 +26,16 @@ def run(source: int, target: int) -> int:
 
     server, inbox = Server(send), Inbox()
     try:
+        # messages of the client and answers of the checker, whichever comes first
         while server.exit_code is None:
             left = server.checker.go_on()
             pipe = server.checker.pipe
             ready = wait([source] if pipe is None else [source, pipe], left)
             if pipe is not None and pipe in ready:
-                server.checked(*server.checker.answer())
+                server.publish_check(*server.checker.answer())
             if source in ready:
                 data = os.read(source, CHUNK)
+                # the client ended its output
                 if not data:
                     return 1
                 for message in inbox.put(data):

@@ -39,8 +39,10 @@ def marks(tree: syntax.File) -> Marks:
         if isinstance(node, syntax.Unit):
             units.append(node.span)
             continue
+        # what stands behind a colon is a domain there
         if isinstance(node, (syntax.Node, syntax.Port, syntax.Branch, syntax.Coord, syntax.BundleMember)):
             domains.add(node.domain.span.start)
+        # level names are looked up in the component
         elif isinstance(node, syntax.SceneLevel):
             levels[node.level.span.start] = node.target
         elif isinstance(node, syntax.Level):
@@ -51,6 +53,7 @@ def marks(tree: syntax.File) -> Marks:
 
 
 def _names(node: object, text: str) -> Iterator[int]:
+    """Offsets of the names of a node: where the cursor may ask for their meaning."""
     match node:
         case syntax.Name() | syntax.Word() | syntax.Decl() | syntax.Call() | syntax.Parameter():
             yield node.span.start

@@ -95,36 +95,41 @@ def items(tree: syntax.File) -> Iterator[Declared]:
         if kind is not None:
             body = tuple(getattr(item, "body", ()))
             word: syntax.Word = getattr(item, "name")  # noqa: B009 (of one of the kinds above)
-            yield _declared(tree.source, word.name, kind, word.span, item, body=body)
+            yield _declaration(tree.source, word.name, kind, word.span, item, body=body)
 
 
 def body(source: SourceText, statements: Sequence[Any]) -> Iterator[Declared]:
     """The names that statements declare, those of levels and loops too."""
     for s in statements:
+        # param k, let x, state s: one name
         if (kind := _SINGLE.get(type(s))) is not None:
             unit = getattr(s, "unit", None)
-            yield _declared(source, s.decl.name, kind, s.decl.span, s, of="" if unit is None else unit.text)
+            yield _declaration(source, s.decl.name, kind, s.decl.span, s, of="" if unit is None else unit.text)
+        # node a, b: several
         elif (kind := _SEVERAL.get(type(s))) is not None:
             of = s.unit.text if isinstance(s, syntax.Implicit) else s.domain.name
             for decl in s.decls:
-                yield _declared(source, decl.name, kind, decl.span, s, of=of)
+                yield _declaration(source, decl.name, kind, decl.span, s, of=of)
+        # an element or a component
         elif isinstance(s, syntax.Instance):
             of = ".".join(s.component.names)
             kind = "element" if of in (*ONE_PORTS, *TWO_PORTS) else "instance"
-            yield _declared(source, s.decl.name, kind, s.decl.span, s, of=of)
+            yield _declaration(source, s.decl.name, kind, s.decl.span, s, of=of)
         elif isinstance(s, (syntax.Energy, syntax.Content)) and s.name is not None:
-            yield _declared(
+            yield _declaration(
                 source, s.name.name, "energy" if isinstance(s, syntax.Energy) else "content", s.name.span, s
             )
+        # a level and all that stands in it
         elif isinstance(s, syntax.Level):
-            yield _declared(source, s.name.name, "level", s.name.span, s, body=s.body)
+            yield _declaration(source, s.name.name, "level", s.name.span, s, body=s.body)
             yield from body(source, s.body)
+        # the loop variable and the loop's body
         elif isinstance(s, syntax.For):
-            yield _declared(source, s.index.name, "index", s.index.span, s)
+            yield _declaration(source, s.index.name, "index", s.index.span, s)
             yield from body(source, s.body)
 
 
-def _declared(
+def _declaration(
     source: SourceText, name: str, kind: str, span: Span, node: Any, of: str = "", body: tuple[Any, ...] = ()
 ) -> Declared:
     place = source.place(span.start, span.start + len(name))
@@ -137,6 +142,7 @@ def symbols(tree: syntax.File) -> list[dict[str, Any]]:
 
 
 def _inner(source: SourceText, item: Declared) -> list[dict[str, Any]]:
+    """Symbols inside of a model or component, those of levels under their level."""
     if item.kind not in ("model", "component"):
         return []
     found, seen = [], set[tuple[str, Span]]()

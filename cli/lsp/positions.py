@@ -40,6 +40,7 @@ def offset(source: SourceText, at: dict[str, Any]) -> int:
     if line >= len(source.line_starts):
         return len(source.text)
     start, text = source.line_starts[line], source.line(line + 1)
+    # characters of the protocol are units of UTF-16: two beyond the first plane
     if not text.isascii():
         for k, sign in enumerate(text):
             character -= 1 + (sign > ASTRAL)

@@ -9,7 +9,7 @@ from typing import Any
 
 from sysdyn import __version__
 from sysdyn.cli.lsp import completion, findings, hover, outline, positions, wire
-from sysdyn.cli.lsp.checker import Accounts, Checker, shown
+from sysdyn.cli.lsp.checker import Accounts, Checker, visible_findings
 from sysdyn.cli.lsp.documents import LONGEST, Document, Documents
 from sysdyn.cli.run.check.checking import Checked
 from sysdyn.dsl.text.diagnostics import Diagnostic
@@ -50,23 +50,23 @@ class Server:
         self._shut = False
         self._requests: dict[str, Callable[[dict[str, Any]], Any]] = {
             "initialize": self._initialize,
-            "shutdown": self._shutdown,
+            "shutdown": self._shut_down,
             "textDocument/formatting": self._formatting,
             "textDocument/codeAction": self._actions,
             "textDocument/hover": self._hover,
             "textDocument/definition": self._definition,
             "textDocument/references": self._references,
-            "textDocument/rename": self._renamed,
+            "textDocument/rename": self._rename,
             "textDocument/documentSymbol": self._symbols,
             "textDocument/completion": self._completion,
         }
         self._notifications: dict[str, Callable[[dict[str, Any]], None]] = {
             "initialized": lambda _: self.checker.begin(),
             "exit": self._exit,
-            "textDocument/didOpen": self._opened,
-            "textDocument/didChange": self._changed,
-            "textDocument/didSave": self._saved,
-            "textDocument/didClose": self._closed,
+            "textDocument/didOpen": self._open_document,
+            "textDocument/didChange": self._change_document,
+            "textDocument/didSave": self._save_document,
+            "textDocument/didClose": self._close_document,
             "workspace/didChangeWatchedFiles": self._others_changed,
         }
 
@@ -76,17 +76,21 @@ class Server:
             self._refuse(None, message.code, str(message))
             return
         method, number = message.get("method"), message.get("id")
+        # ids are numbers or texts
         if number is not None and type(number) not in (int, str):
             self._refuse(None, wire.INVALID_REQUEST, "the id of a message is a whole number or a text")
             return
+        # an answer to what was never asked, or nonsense
         if not isinstance(method, str):
             if "id" not in message or not ("result" in message or "error" in message):
                 self._refuse(number, wire.INVALID_REQUEST, "a message without a method")
             return  # an answer: nothing was asked
         params = message.get("params")
         given = params if isinstance(params, dict) else {}
+        # a request wants an answer, whatever happens
         if "id" in message:
             self._answer(number, method, given)
+        # notifications count between initialize and shutdown
         elif method == "exit" or (self._initialized and not self._shut and method in self._notifications):
             try:
                 self._notifications[method](given)
@@ -125,7 +129,7 @@ class Server:
         self._initialized = True
         return {"capabilities": CAPABILITIES, "serverInfo": {"name": "sysdyn", "version": __version__}}
 
-    def _shutdown(self, _: dict[str, Any]) -> None:
+    def _shut_down(self, _: dict[str, Any]) -> None:
         self._shut = True
 
     def _exit(self, _: dict[str, Any]) -> None:
@@ -133,17 +137,17 @@ class Server:
 
     # -- documents and their findings ----------------------------------------------------------------------
 
-    def _opened(self, params: dict[str, Any]) -> None:
+    def _open_document(self, params: dict[str, Any]) -> None:
         item = params["textDocument"]
         self._hold(Document(str(item["uri"]), str(item["text"]), item.get("version")), at_once=True)
 
-    def _changed(self, params: dict[str, Any]) -> None:
+    def _change_document(self, params: dict[str, Any]) -> None:
         item = params["textDocument"]
         document = self._documents.get(item["uri"])
         if document is not None:
-            self._hold(document.changed(params["contentChanges"], item.get("version")))
+            self._hold(document.apply_changes(params["contentChanges"], item.get("version")))
 
-    def _saved(self, params: dict[str, Any]) -> None:
+    def _save_document(self, params: dict[str, Any]) -> None:
         document = self._documents.get(params["textDocument"]["uri"])
         if document is not None:  # files beside it may have changed too
             self._ask(document, at_once=True)
@@ -152,7 +156,8 @@ class Server:
         for document in self._documents.all():
             self.checker.ask(document.name)
 
-    def _closed(self, params: dict[str, Any]) -> None:
+    def _close_document(self, params: dict[str, Any]) -> None:
+        """Forget a document that was closed; files that import it are checked again as it is on disk."""
         document = self._documents.get(params["textDocument"]["uri"])
         if document is None:
             return
@@ -173,15 +178,15 @@ class Server:
         for other in self._documents.dependent(document):
             self.checker.ask(other.name, at_once)
 
-    def checked(self, name: str, text: str | None, result: Checked | Accounts) -> None:
+    def publish_check(self, name: str, text: str | None, result: Checked | Accounts) -> None:
         """Publish what the check of a text found, if it is open still and no newer one waits."""
-        document = self._documents.named(name)
+        document = self._documents.find_by_name(name)
         if document is None or document.source.text != text:
             return
         if not isinstance(result, Checked):
             document.accounts = result
             return
-        found = shown(result)
+        found = visible_findings(result)
         self._found[document.uri] = tuple(found)
         listed = findings.by_uri(found, document.uri, self._documents.uri_of)
         if result.unread is not None:
@@ -211,7 +216,7 @@ class Server:
         document = self._document(params)
         if document is not None and document.long:
             raise RefusedError(f"the text is longer than {LONGEST} characters: sysdyn fmt lays it out")
-        return None if document is None else findings.formatted(document)
+        return None if document is None else findings.format_edits(document)
 
     def _actions(self, params: dict[str, Any]) -> Any:
         document = self._document(params)
@@ -221,29 +226,29 @@ class Server:
         only: Sequence[str] = params.get("context", {}).get("only") or ()
         return findings.actions(document, self._found.get(document.uri, ()), Span(start, end), only)
 
-    def _placed(self, params: dict[str, Any]) -> tuple[Document, int] | None:
+    def _document_and_offset(self, params: dict[str, Any]) -> tuple[Document, int] | None:
         document = self._document(params)
         return None if document is None else (document, positions.offset(document.source, params["position"]))
 
     def _hover(self, params: dict[str, Any]) -> Any:
-        at = self._placed(params)
+        at = self._document_and_offset(params)
         return None if at is None else hover.hover(*at, self._found.get(at[0].uri, ()))
 
     def _definition(self, params: dict[str, Any]) -> Any:
-        at = self._placed(params)
+        at = self._document_and_offset(params)
         return None if at is None else hover.definition(*at)
 
     def _references(self, params: dict[str, Any]) -> Any:
-        at = self._placed(params)
+        at = self._document_and_offset(params)
         whole = bool(params.get("context", {}).get("includeDeclaration", True))
         return None if at is None else hover.references(*at, whole)
 
-    def _renamed(self, params: dict[str, Any]) -> Any:
-        at = self._placed(params)
+    def _rename(self, params: dict[str, Any]) -> Any:
+        at = self._document_and_offset(params)
         if at is not None and at[0].long:
             raise RefusedError(f"the text is longer than {LONGEST} characters: its names are not looked for")
         try:
-            return None if at is None else hover.renamed(*at, str(params["newName"]))
+            return None if at is None else hover.rename_edits(*at, str(params["newName"]))
         except ValueError as error:
             raise RefusedError(str(error)) from None
 
@@ -252,7 +257,7 @@ class Server:
         return None if document is None else outline.symbols(document.tree)
 
     def _completion(self, params: dict[str, Any]) -> Any:
-        at = self._placed(params)
+        at = self._document_and_offset(params)
         return None if at is None else completion.complete(*at)
 
 

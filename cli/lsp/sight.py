@@ -77,7 +77,7 @@ def local(document: Document, offset: int) -> Iterator[Declared]:
         name = item.model.names[-1]
         item = next((i for i in document.tree.items if isinstance(i, syntax.Model) and i.name.name == name), None)
     if isinstance(item, (syntax.Model, syntax.Component)) and not _of_head(item, offset):
-        yield from _declared(document.source, item)
+        yield from _declarations(document.source, item)
     elif isinstance(item, (syntax.Function, syntax.Table)) and not _of_head(item, offset):
         for p in item.params:
             place = document.source.place(p.span.start, p.span.start + len(p.name))
@@ -108,7 +108,7 @@ def module_of(source: SourceText, names: tuple[str, ...]) -> syntax.File | None:
         return _of_library(path) if path.is_file() else None
     path = Path(source.name).parent.joinpath(*names).with_suffix(".sd")
     try:
-        return _parsed(SourceText.read(path))
+        return _parse(SourceText.read(path))
     except (OSError, ModelError, ValueError):
         return None
 
@@ -119,7 +119,7 @@ def _of_library(path: Path) -> syntax.File:
 
 
 @lru_cache(32)
-def _parsed(source: SourceText) -> syntax.File:
+def _parse(source: SourceText) -> syntax.File:
     return parse(source)[0]
 
 
@@ -129,7 +129,7 @@ def _items(tree: syntax.File) -> tuple[Declared, ...]:
 
 
 @lru_cache(64)
-def _declared(source: SourceText, item: syntax.Model | syntax.Component) -> tuple[Declared, ...]:
+def _declarations(source: SourceText, item: syntax.Model | syntax.Component) -> tuple[Declared, ...]:
     return (*outline.body(source, item.body),)
 
 
@@ -138,22 +138,28 @@ def find(document: Document, word: Word) -> list[Declared]:
     if document.marks.unit(word.start):
         return []
     around = instance_at(document, word.start)
+    # inside of an element's statement
     if around is not None and not word.path:
         of = ".".join(around.component.names)
-        if of in ONE_PORTS and word.name in OWN and any(_within(word, arg) for arg in around.args or ()):
+        if of in ONE_PORTS and word.name in OWN and any(_is_inside(word, arg) for arg in around.args or ()):
             return []  # the element's own variable
+        # names of arguments of the language
         if of in TWO_PORTS and any(arg.span.start == word.start for arg in around.args or ()):
             return []
-        if any(word.start == start for start in named(around)):
+        # names of arguments are the component's
+        if any(word.start == start for start in inner_names(around)):
             inside = members(document, (around.decl.name,), word.start)
             return [d for d in inside if d.name == word.name]
+    # a.b: among the members of a
     if word.path:
         return [d for d in members(document, word.path, word.start) if d.name == word.name]
     marks = document.marks
+    # the name of a level
     if word.start in marks.levels:
         target = marks.levels[word.start]
         among = local(document, word.start) if target is None else _inside(document, target)
         return [d for d in among if d.name == word.name and d.kind == "level"]
+    # local names before those of the file
     near = [d for d in local(document, word.start) if d.name == word.name and d.kind != "level"]
     if word.start in marks.domains or (around is not None and around.component.span.start == word.start):
         near = []  # labels and values do not hide it
@@ -167,11 +173,11 @@ def _inside(document: Document, target: syntax.Expr) -> list[Declared]:
     return members(document, tuple(path), target.span.start)
 
 
-def _within(word: Word, arg: syntax.Arg) -> bool:
+def _is_inside(word: Word, arg: syntax.Arg) -> bool:
     return arg.span.start <= word.start < arg.span.end
 
 
-def named(instance: syntax.Instance) -> Iterator[int]:
+def inner_names(instance: syntax.Instance) -> Iterator[int]:
     """Where an instance's arguments and connections name what is inside its component."""
     yield from (arg.span.start for arg in instance.args or () if arg.name is not None)
     for c in instance.connections:

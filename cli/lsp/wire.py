@@ -37,7 +37,9 @@ class Inbox:
             yield found
 
     def _next(self) -> dict[str, Any] | BadMessage | None:
+        """The next message of the bytes so far, or what is wrong with them; None where more is needed."""
         while self._passed or self._length is None:
+            # the body of a message that was too long is thrown away
             if self._passed:
                 gone = min(self._passed, len(self._bytes))
                 del self._bytes[:gone]
@@ -45,6 +47,7 @@ class Inbox:
                 if self._passed:
                     return None
                 continue
+            # the head
             end = self._bytes.find(_END)
             if end < 0:
                 if len(self._bytes) <= _LONGEST_HEAD:
@@ -55,12 +58,14 @@ class Inbox:
             del self._bytes[: end + len(_END)]
             if length is None:
                 return BadMessage(PARSE_ERROR, "the head of a message has no Content-Length")
+            # refused, and passed over
             if length > MOST:
                 self._passed = length
                 return BadMessage(PARSE_ERROR, f"a message of {length} bytes is longer than {MOST}")
             self._length = length
         if len(self._bytes) < self._length:
             return None
+        # the head said how long it is
         body = bytes(self._bytes[: self._length])
         del self._bytes[: self._length]
         self._length = None

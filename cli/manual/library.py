@@ -6,7 +6,7 @@ from collections.abc import Iterator, Sequence
 from functools import cache
 from typing import Any
 
-from sysdyn.cli.page.columns import aligned
+from sysdyn.cli.page.columns import align
 from sysdyn.dsl.elaborate.files import LIBRARY
 from sysdyn.dsl.format.format import format_expression
 from sysdyn.dsl.parser.parse import parse
@@ -74,7 +74,7 @@ def index(module: str | None = None) -> str:
         if module is None or name == module:
             head = "always there" if name == PRELUDE else f"std.{name}"
             rows = [(f"  {e.name}", e.line) for e in entries() if e.module == name]
-            parts.append("\n".join([f"{head}{': ' if said else ''}{said}", aligned(rows)]))
+            parts.append("\n".join([f"{head}{': ' if said else ''}{said}", align(rows)]))
     return "\n\n".join(parts)
 
 
@@ -87,19 +87,19 @@ def find(name: str) -> Entry | None:
 def page(entry: Entry) -> str:
     """What a user of the library needs of one entry: ports, parameters, text, an example."""
     if not isinstance(entry.item, syntax.Component):
-        return f"{entry.name}: {entry.line}\nIn every file, without an import.\n\n{_indented(entry.text)}"
+        return f"{entry.name}: {entry.line}\nIn every file, without an import.\n\n{_indent(entry.text)}"
     body = tuple(_statements(entry.item.body))
     parts = [f"{entry.name}: {entry.doc}\n\n    from std.{entry.module} import {entry.name}", picture(entry)]
     rows = [(f"  {p['name']}", p["unit"], p["default"] or "required", p["doc"]) for p in parameters(entry.item)]
     if rows:
-        parts.append("Parameters and inputs\n" + aligned([("  name", "unit", "default", ""), *rows]))
+        parts.append("Parameters and inputs\n" + align([("  name", "unit", "default", ""), *rows]))
     levels = [(f"  {s.name.name}{'*' if s.default else ''}", s.doc or "") for s in body if isinstance(s, syntax.Level)]
     if levels:
         other = levels[-1][0].strip(" *")
-        parts.append(f"Levels (* is taken where none is named, as in {entry.name}.{other}(...))\n{aligned(levels)}")
+        parts.append(f"Levels (* is taken where none is named, as in {entry.name}.{other}(...))\n{align(levels)}")
     shown = example(entry)
-    parts += ["Its text", _indented(entry.text)]
-    parts += ["Example", _indented(shown)] if shown else []
+    parts += ["Its text", _indent(entry.text)]
+    parts += ["Example", _indent(shown)] if shown else []
     return "\n\n".join(parts)
 
 
@@ -109,7 +109,7 @@ def account(entry: Entry) -> dict[str, Any]:
     found["text"] = entry.text
     if isinstance(entry.item, syntax.Component):
         found |= {"ports": ports(entry.item), "parameters": parameters(entry.item), "example": example(entry)}
-        found["laws"] = [_said(entry, s) for s in _statements(entry.item.body) if isinstance(s, _LAWS)]
+        found["laws"] = [_statement_text(entry, s) for s in _statements(entry.item.body) if isinstance(s, _LAWS)]
         found["levels"] = [s.name.name for s in entry.item.body if isinstance(s, syntax.Level)]
     return found
 
@@ -125,7 +125,7 @@ def _statements(body: Sequence[syntax.Statement]) -> Iterator[syntax.Statement]:
             yield from _statements(statement.body)
 
 
-def _said(entry: Entry, statement: syntax.Statement) -> str:
+def _statement_text(entry: Entry, statement: syntax.Statement) -> str:
     return " ".join(entry.source.text[statement.span.start : statement.span.end].split())
 
 
@@ -168,6 +168,7 @@ def picture(entry: Entry) -> str:
     inputs = [p["name"] for p in parameters(entry.item) if p["kind"] == "input"]
     outputs = [p["name"] for p in found if p["kind"] == "output"]
     nodes = [f"{p['name']} ({p['domain']})" for p in found if p["kind"] == "port"]
+    # nodes on both sides, branches from left to right
     half = (len(nodes) + 1) // 2
     left, right = [f"{n} o--" for n in nodes[:half]], [f"--o {n}" for n in nodes[half:]]
     for b in branches:
@@ -176,6 +177,7 @@ def picture(entry: Entry) -> str:
         right.append(f"--o {name}b")
     left += [f"{n} -->" for n in inputs]
     right += [f"--> {n}" for n in outputs]
+    # both sides as high as the longer one
     height = max(len(left), len(right), 1)
     left += [""] * (height - len(left))
     right += [""] * (height - len(right))
@@ -228,5 +230,5 @@ def example(entry: Entry) -> str | None:
     return "\n".join(imports) + "\n\n" + "\n\n".join(texts) + "\n"
 
 
-def _indented(text: str) -> str:
+def _indent(text: str) -> str:
     return "\n".join(f"    {line}".rstrip() for line in text.rstrip().splitlines())

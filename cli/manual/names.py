@@ -6,7 +6,7 @@ import math
 from collections.abc import Sequence
 from typing import Any
 
-from sysdyn.cli.page.columns import aligned
+from sysdyn.cli.page.columns import align
 from sysdyn.dsl.format.format import format_expression
 from sysdyn.dsl.load import Document, Listing
 from sysdyn.dsl.model.network import Parameter
@@ -24,6 +24,7 @@ def account(document: Document, model: syntax.Model, found: Listing) -> dict[str
     docs = {s.decl.name: s.doc for s in model.body if isinstance(s, (syntax.Param, syntax.Input))}
     parameters: list[dict[str, Any]] = []
     inputs: list[dict[str, Any]] = []
+    # parameters and inputs with their values
     for name, parameter in found.parameters.items():
         values = _values(parameter, found.known)
         entry = {"name": name + _shape(parameter, found.known), "unit": parameter.unit.text, "value": values}
@@ -31,6 +32,7 @@ def account(document: Document, model: syntax.Model, found: Listing) -> dict[str
         (inputs if name in found.inputs else parameters).append(entry)
     held = {i["name"] for i in inputs}
     statements = {s.decl.name: s for s in model.body if isinstance(s, syntax.Input)}
+    # inputs by formulas
     for name in found.inputs:
         if name not in held:
             value, unit = statements[name].value, statements[name].unit.text
@@ -112,10 +114,11 @@ def _lines(a: dict[str, Any]) -> list[str]:
 
 
 def _section(title: str, rows: Sequence[tuple[str, ...]]) -> list[str]:
-    return ["", title, *(f"  {line}" for line in aligned(rows).splitlines())] if rows else []
+    return ["", title, *(f"  {line}" for line in align(rows).splitlines())] if rows else []
 
 
 def _parameter_row(p: dict[str, Any]) -> tuple[str, ...]:
+    """Name, value with unit, and first line of the text of a parameter."""
     value = p["value"]
     unit = "" if p["unit"] == "1" else f" {p['unit']}"
     if value is None:

@@ -53,19 +53,22 @@ def _prose(text: str) -> str:
     lines: list[str] = []
     fence: str | None = None
     for line in [*text.splitlines(), ""]:
+        # a fence opens or closes
         if line.startswith("```"):
             if fence is not None:
-                made.append(_fenced(fence, lines))
+                made.append(_code_block(fence, lines))
             fence, lines = (line.removeprefix("```") if fence is None else None), []
+        # inside of a fence or paragraph
         elif fence is not None or line.strip():
             lines.append(line)
+        # an empty line ends a paragraph or table
         elif lines:
             made.append(_table(lines) if lines[0].startswith("|") else f"<p>{_inline(' '.join(lines))}</p>")
             lines = []
     return "\n".join(made)
 
 
-def _fenced(said: str, lines: Sequence[str]) -> str:
+def _code_block(said: str, lines: Sequence[str]) -> str:
     kind, _, what = said.partition(" ")
     text = "\n".join(lines)
     shown = block(text) if kind == "sd" else f'<pre class="source plain">{escape(text)}</pre>'
@@ -95,6 +98,7 @@ def _library() -> str:
 
 
 def _entry(entry: library.Entry) -> str:
+    """HTML of a library's entry: picture, parameters, text and example."""
     parts = [f'<h4 id="{_anchor(entry)}"><code>{escape(entry.name)}</code></h4><p>{escape(entry.doc)}</p>']
     if isinstance(entry.item, syntax.Component):
         parts.append(f"<pre>{escape(library.picture(entry))}</pre>")

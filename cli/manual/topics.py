@@ -7,7 +7,7 @@ from functools import cache
 from pathlib import Path
 
 import sysdyn.dsl.load
-from sysdyn.cli.page.columns import aligned
+from sysdyn.cli.page.columns import align
 from sysdyn.values import dataclass
 
 FOLDER = Path(sysdyn.dsl.load.__file__).parent / "language"
@@ -76,7 +76,7 @@ def topics() -> dict[str, Topic]:
     return found
 
 
-def named(word: str) -> Topic | None:
+def find_topic(word: str) -> Topic | None:
     """The page of that name or beginning, else the only one whose title holds the word."""
     pages = topics()
     if word in pages:
@@ -92,7 +92,7 @@ def named(word: str) -> Topic | None:
 
 def index() -> str:
     """One line a page."""
-    return aligned([(f"  {t.name}", t.title) for t in topics().values()])
+    return align([(f"  {t.name}", t.title) for t in topics().values()])
 
 
 def examples() -> list[Example]:
@@ -132,7 +132,7 @@ def _rows(table: list[list[str]]) -> str:
     """Rows of a Markdown table without its rule; an empty head is left out."""
     rows = [row for k, row in enumerate(table) if k != 1 and any(row[1:] if k == 0 else row)]
     width = max(map(len, rows))
-    return aligned([row + [""] * (width - len(row)) for row in rows])
+    return align([row + [""] * (width - len(row)) for row in rows])
 
 
 def _plain(text: str) -> str:

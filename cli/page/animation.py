@@ -13,12 +13,12 @@ from itertools import accumulate
 
 import numpy as np
 from sysdyn.cli.failures import UsageError
-from sysdyn.cli.page.curves import BOTTOM, HEIGHT, LEFT, RIGHT, TOP, WIDTH, axes, framed, ticks
+from sysdyn.cli.page.curves import BOTTOM, HEIGHT, LEFT, RIGHT, TOP, WIDTH, axes, frame_around, ticks
 from sysdyn.cli.page.document import document
 from sysdyn.cli.page.named import no_quantity
-from sysdyn.cli.page.panels import COLOURS, Floats, Panel, curve, panels_of, shortened, time_unit, unit_text
+from sysdyn.cli.page.panels import COLOURS, Floats, Panel, abbreviate, curve, panels_of, time_unit, unit_text
 from sysdyn.cli.page.unit_text import conversion
-from sysdyn.names import stored
+from sysdyn.names import trace_name
 from sysdyn.runtime.trace.trace import Trace
 from sysdyn.values import dataclass
 
@@ -51,7 +51,7 @@ class Film:
         known = np.isfinite(values)
         return np.interp(self.instants, time[known], values[known]) if known.any() else None
 
-    def moved(self, attribute: str, texts: Sequence[str]) -> str:
+    def animate_attribute(self, attribute: str, texts: Sequence[str]) -> str:
         """The attribute of the element around takes these values, one a frame; "" where it stands still."""
         if len(set(texts)) < 2:
             return ""
@@ -99,7 +99,7 @@ def _link(trace: Trace, text: str) -> Link:
 
 def _coordinate(trace: Trace, text: str) -> str:
     """A coordinate as the trace spells it, or a number."""
-    name = text if text in trace.names else stored(text)
+    name = text if text in trace.names else trace_name(text)
     if name in trace.names:
         return name
     try:
@@ -144,11 +144,13 @@ def _stage(it: Film, links: Sequence[Link]) -> tuple[str, float]:
     unit = units[0] if units else "1"
     placed = [[_place(it, point, unit) for point in link] for link in links]
     x, y = (np.concatenate([p[k] for link in placed for p in link]) for k in (0, 1))
+    # both axes at one scale, with a margin
     size = max(np.ptp(x), np.ptp(y)) or max(abs(x).max(), abs(y).max()) or 1.0
     wide, tall = np.ptp(x) + 0.1 * size, np.ptp(y) + 0.1 * size
     pixels = min((WIDTH - LEFT - RIGHT) / wide, (TALLEST - TOP - BOTTOM) / tall)
     left, bottom, height = x.min() - 0.05 * size, y.min() - 0.05 * size, pixels * tall + TOP + BOTTOM
     parts = []
+    # grid lines and their numbers
     for value, label in ticks(left, left + wide, 6):
         u = LEFT + pixels * (value - left)
         parts.append(f'<line class="grid" x1="{u:.1f}" x2="{u:.1f}" y1="{TOP}" y2="{height - BOTTOM:.1f}"/>')
@@ -158,6 +160,7 @@ def _stage(it: Film, links: Sequence[Link]) -> tuple[str, float]:
         parts.append(f'<line class="grid" x1="{LEFT}" x2="{LEFT + pixels * wide:.1f}" y1="{v:.1f}" y2="{v:.1f}"/>')
         parts.append(f'<text x="{LEFT - 6}" y="{v + 4:.1f}" text-anchor="end">{label}</text>')
     parts.append(f'<text x="4" y="{TOP - 3}">[{escape(unit_text(unit) or "1")}]</text>')
+    # points that belong together in one colour
     for k, link in enumerate(placed):
         across = [(LEFT + pixels * (a - left), height - BOTTOM - pixels * (b - bottom)) for a, b in link]
         parts += _drawn(it, across, COLOURS[k % len(COLOURS)])
@@ -189,11 +192,11 @@ def _drawn(it: Film, link: Sequence[tuple[Floats, Floats]], colour: str) -> list
             parts.append(f'<polyline points="{way}" fill="none" stroke="{colour}" stroke-opacity=".25"/>')
     if len(link) > 1:
         lines = [" ".join(f"{u[k]:.1f},{v[k]:.1f}" for u, v in link) for k in frames]
-        moved = it.moved("points", lines)
+        moved = it.animate_attribute("points", lines)
         parts.append(f'<polyline points="{lines[0]}" fill="none" stroke="{colour}" stroke-width="3">{moved}</polyline>')
     for u, v in link:
         across, down = ([f"{value:.1f}" for value in at] for at in (u, v))
-        moved = it.moved("cx", across) + it.moved("cy", down)
+        moved = it.animate_attribute("cx", across) + it.animate_attribute("cy", down)
         parts.append(f'<circle cx="{across[0]}" cy="{down[0]}" r="5" fill="{colour}">{moved}</circle>')
     return parts
 
@@ -202,20 +205,20 @@ def _curves(it: Film, panel: Panel, scale: float, time: str) -> tuple[str, float
     """A panel of curves, each with its mark, and the line of the present instant."""
     curves = [(name, values) for name in panel.names if (values := it.values(name)) is not None]
     low, high = (float(t) for t in it.instants[[0, -1]] * scale)
-    frame = framed(low, high, [values for _, values in curves])
+    frame = frame_around(low, high, [values for _, values in curves])
     if frame is None:
         return f'<text x="{LEFT}" y="{TOP}">{escape(panel.names[0])}: no numbers</text>', 2.0 * TOP
     u = frame.across(it.instants * scale)
     parts = axes(frame, time, unit_text(panel.unit) or "1")
     across = [f"{value:.1f}" for value in u]
     now = f'x1="{across[0]}" x2="{across[0]}" y1="{TOP}" y2="{HEIGHT - BOTTOM}" stroke="#5f6b7a" stroke-dasharray="3 3"'
-    parts.append(f"<line {now}>{it.moved('x1', across)}{it.moved('x2', across)}</line>")
+    parts.append(f"<line {now}>{it.animate_attribute('x1', across)}{it.animate_attribute('x2', across)}</line>")
     for k, (name, y) in enumerate(curves):
-        colour, down = COLOURS[k % len(COLOURS)], [f"{v:.1f}" for v in frame.down(y)]
+        colour, down = COLOURS[k % len(COLOURS)], [f"{v:.1f}" for v in frame.y_pixels(y)]
         way = " ".join(f"{a},{b}" for a, b in zip(across, down, strict=True))
-        moved = it.moved("cx", across) + it.moved("cy", down)
+        moved = it.animate_attribute("cx", across) + it.animate_attribute("cy", down)
         parts.append(f'<polyline points="{way}" fill="none" stroke="{colour}" stroke-width="1.5"/>')
         parts.append(f'<circle cx="{across[0]}" cy="{down[0]}" r="4" fill="{colour}">{moved}</circle>')
         named = f'x="{WIDTH - RIGHT - 6}" y="{TOP + 14 + 14 * k}" text-anchor="end" style="fill:{colour}"'
-        parts.append(f"<text {named}>{escape(shortened(name, 40))}</text>")
+        parts.append(f"<text {named}>{escape(abbreviate(name, 40))}</text>")
     return "\n".join(parts), float(HEIGHT)

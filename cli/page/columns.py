@@ -7,7 +7,7 @@ import sys
 from collections.abc import Collection, Iterable, Sequence
 
 
-def aligned(rows: Sequence[Sequence[str]], right: Collection[int] = ()) -> str:
+def align(rows: Sequence[Sequence[str]], right: Collection[int] = ()) -> str:
     """Rows of cells as lines; columns of the numbers `right` end at one place, the others begin at one."""
     widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
     lines = []
@@ -22,7 +22,7 @@ def terminal() -> int | None:
     return shutil.get_terminal_size().columns if sys.stdout.isatty() else None
 
 
-def fitted(rows: Sequence[Sequence[str]], spare: Sequence[str], width: int | None) -> tuple[list[list[str]], str]:
+def fit_columns(rows: Sequence[Sequence[str]], spare: Sequence[str], width: int | None) -> tuple[list[list[str]], str]:
     """Rows without as many of the columns that can be spared, the first first, as make them fit, and the line that says
     so; width: None: whatever they take.
     """

@@ -23,15 +23,18 @@ def outline(source: Source, name: str, low: float, high: float, scale: float = 1
     scale: of the source's time to s.
     """
     time = source.time * scale
+    # the window, and an instant beyond it on each side
     a = max(int(np.searchsorted(time, low, side="left")) - 1, 0)
     b = min(int(np.searchsorted(time, high, side="right")) + 1, time.size)
     values, rates = source.read(name, a, b)
     time = time[a:b]
+    # many points: least and largest of each column
     if time.size > 2 * COLUMNS:
         edges = np.unique(np.searchsorted(time, np.linspace(time[0], time[-1], COLUMNS + 1)[:-1]))
         with np.errstate(invalid="ignore"):
             least, most = np.minimum.reduceat(values, edges), np.maximum.reduceat(values, edges)
         x, y = np.repeat(time[edges], 2), np.stack([least, most], axis=1).ravel()
+    # few: the curve between them
     elif time.size > 1 and time[-1] > time[0]:
         grid = np.linspace(max(low, time[0]), min(high, time[-1]), COLUMNS)
         curve = Curve(time, values, None if rates is None else rates / scale)
@@ -43,6 +46,7 @@ def outline(source: Source, name: str, low: float, high: float, scale: float = 1
         x, y = time, values
     inside = (x >= low) & (x <= high)
     x, y = x[inside], y[inside]
+    # what is no number interrupts the line
     breaks = np.flatnonzero(np.diff(np.isfinite(y).astype(int)) != 0) + 1
     pieces = zip(np.split(x, breaks), np.split(y, breaks), strict=True)
     return [(px, py) for px, py in pieces if py.size and np.isfinite(py).all()]
@@ -61,16 +65,16 @@ class Frame:
         """Pixels from the left."""
         return LEFT + (time - self.low) / (self.high - self.low) * (WIDTH - LEFT - RIGHT)
 
-    def down(self, value: Any) -> Any:
+    def y_pixels(self, value: Any) -> Any:
         """Pixels from the top."""
         return HEIGHT - BOTTOM - (value - self.bottom) / (self.top - self.bottom) * (HEIGHT - TOP - BOTTOM)
 
     def points(self, x: Floats, y: Floats) -> list[str]:
         """A line's points."""
-        return [f"{u:.1f},{v:.1f}" for u, v in zip(self.across(x), self.down(y), strict=True)]
+        return [f"{u:.1f},{v:.1f}" for u, v in zip(self.across(x), self.y_pixels(y), strict=True)]
 
 
-def framed(low: float, high: float, values: Sequence[Floats]) -> Frame | None:
+def frame_around(low: float, high: float, values: Sequence[Floats]) -> Frame | None:
     """The frame around some values; None where there is nothing to draw."""
     if not values or not high > low:
         return None
@@ -88,7 +92,7 @@ def axes(frame: Frame, time_unit: str, unit: str) -> list[str]:
         parts.append(f'<line class="grid" x1="{u:.1f}" x2="{u:.1f}" y1="{TOP}" y2="{HEIGHT - BOTTOM}"/>')
         parts.append(f'<text x="{u:.1f}" y="{HEIGHT - BOTTOM + 14}" text-anchor="middle">{label}</text>')
     for value, label in ticks(frame.bottom, frame.top, 5):
-        v = frame.down(value)
+        v = frame.y_pixels(value)
         parts.append(f'<line class="grid" x1="{LEFT}" x2="{WIDTH - RIGHT}" y1="{v:.1f}" y2="{v:.1f}"/>')
         parts.append(f'<text x="{LEFT - 6}" y="{v + 4:.1f}" text-anchor="end">{label}</text>')
     right = f'<text x="{WIDTH - RIGHT}" y="{HEIGHT - 6}" text-anchor="end">time [{escape(time_unit)}]</text>'

@@ -45,12 +45,12 @@ def github(found: Sequence[Diagnostic], plain: Plain) -> str:
             if first == last:  # columns of several lines would be those of the first
                 fields |= {"col": str(start), "endColumn": str(max(end - 1, start))}
         text = d.message + (f"\nhelp: {d.help}" if d.help else "")
-        listed = ",".join(f"{k}={_escaped(v, field=True)}" for k, v in fields.items())
-        lines.append(f"::{_GITHUB[d.severity]} {listed}::{_escaped(text)}")
-    return "\n".join([*lines, *(f"::error::{_escaped(str(p['message']))}" for p in plain)])
+        listed = ",".join(f"{k}={_escape(v, field=True)}" for k, v in fields.items())
+        lines.append(f"::{_GITHUB[d.severity]} {listed}::{_escape(text)}")
+    return "\n".join([*lines, *(f"::error::{_escape(str(p['message']))}" for p in plain)])
 
 
-def _escaped(text: str, *, field: bool = False) -> str:
+def _escape(text: str, *, field: bool = False) -> str:
     """As workflow commands want it: no line ends, in fields no colon and comma."""
     text = text.replace("%", "%25").replace("\r", "%0D").replace("\n", "%0A")
     return text.replace(":", "%3A").replace(",", "%2C") if field else text
@@ -100,6 +100,7 @@ def sarif(found: Sequence[Diagnostic], plain: Plain) -> str:
 
 
 def _result(d: Diagnostic, rule: int) -> dict[str, Any]:
+    """A finding as a result of SARIF, with places, notes and the change that mends it."""
     text = d.message + (f"\nhelp: {d.help}" if d.help else "")
     result: dict[str, Any] = {"ruleId": d.code, "ruleIndex": rule, "level": d.severity, "message": {"text": text}}
     if d.place is not None:

@@ -20,12 +20,14 @@ def junit(suites: Sequence[tuple[str, float, Sequence[tuple[str, str | None]]]])
     total = [case for _, _, found in suites for case in found]
     wrong = sum(text is not None for _, text in total)
     lines.append(f'<testsuites tests="{len(total)}" failures="{wrong}" errors="0">')
+    # a suite for each run or file
     for name, seconds, found in suites:
         failed = sum(text is not None for _, text in found)
         head = f'tests="{len(found)}" failures="{failed}" errors="0" time="{seconds:.3f}"'
         lines.append(f"  <testsuite name={attribute(name)} {head}>")
         for case, text in found:
             start = f"    <testcase classname={attribute(name)} name={attribute(case)}"
+            # passed
             if text is None:
                 lines.append(start + "/>")
             else:

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from sysdyn.cli.failures import UsageError, instead
-from sysdyn.names import stored
+from sysdyn.names import trace_name
 
 if TYPE_CHECKING:
     from sysdyn.cli.console import Console
@@ -36,7 +36,7 @@ def destination(trace: str, output: str | None, console: Console, kinds: tuple[s
     return str(target), target.suffix.lower()
 
 
-def opened(file: str) -> Trace:
+def open_trace(file: str) -> Trace:
     """The trace of a file, or of standard input."""
     from sysdyn.runtime.trace.opening import regular
     from sysdyn.runtime.trace.trace import Trace
@@ -60,18 +60,21 @@ def quantities(traces: list[Trace], wanted: list[str]) -> list[str]:
     from sysdyn.cli.page.panels import in_order
 
     known = in_order(dict.fromkeys(name for trace in traces for name in trace.names))
+    # all that was traced
     if not wanted:
         if not known:
             raise UsageError(f"{traces[0].path} has no quantities: name a meter, audit/energy or audit/constraints")
         return known
     spelled = {name: name for name in known}
+    # ledgers under either spelling
     for trace in traces:
         for meter in ("audit.energy", "audit.constraints"):
             if meter in trace:
                 spelled |= {meter: meter, meter.replace(".", "/"): meter, "/" + meter.replace(".", "/"): meter}
     drawn = []
+    # as the trace spells it, once each
     for name in wanted:
-        found = spelled.get(name) or spelled.get(stored(name))
+        found = spelled.get(name) or spelled.get(trace_name(name))
         if found is None:
             raise UsageError(no_quantity(traces[0], name, spelled, known))
         drawn.append(found)

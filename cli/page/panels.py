@@ -57,7 +57,7 @@ def panels_of(traces: Sequence[Trace], names: Sequence[str]) -> list[Panel]:
     for name in names:
         found = [trace for trace in traces if name in trace]
         unit = found[0][name].units
-        values = np.concatenate([_measured(trace, name, unit)[0] for trace in found])
+        values = np.concatenate([_values_in_unit(trace, name, unit)[0] for trace in found])
         values = values[np.isfinite(values)]
         low, high = (float(values.min()), float(values.max())) if values.size else (0.0, 0.0)
         panel = next((p for p in panels if p.takes(unit, low, high)), None)
@@ -68,7 +68,7 @@ def panels_of(traces: Sequence[Trace], names: Sequence[str]) -> list[Panel]:
     return panels
 
 
-def _measured(trace: Trace, name: str, unit: str) -> tuple[Floats, Floats | None]:
+def _values_in_unit(trace: Trace, name: str, unit: str) -> tuple[Floats, Floats | None]:
     """Values of a quantity and their derivative in a unit; UsageError where it is of another dimension."""
     quantity = trace[name]
     to = conversion(quantity.units, unit)
@@ -83,7 +83,7 @@ def curve(trace: Trace, name: str, unit: str | None = None) -> tuple[Floats, Flo
     """Instants and values of a curve: those of the trace and, where it holds derivatives, of its Hermite interpolant
     between instants that lie far apart; between the two rows of a jump it is upright.  unit: None: its own.
     """
-    time, (values, rate) = trace.time, _measured(trace, name, unit or trace[name].units)
+    time, (values, rate) = trace.time, _values_in_unit(trace, name, unit or trace[name].units)
     if rate is None or time.size < 2 or not np.all(np.diff(time) >= 0.0) or not time[-1] > time[0]:
         return time, values
     h = np.diff(time)
@@ -99,7 +99,7 @@ def curve(trace: Trace, name: str, unit: str | None = None) -> tuple[Floats, Flo
     return np.append(time[piece] + h[piece] * s, time[-1]), np.append(inner, values[-1])
 
 
-def styled(panel: Panel, traces: Sequence[tuple[str, Trace]]) -> Iterator[tuple[str, Trace, str, str, int]]:
+def styled_curves(panel: Panel, traces: Sequence[tuple[str, Trace]]) -> Iterator[tuple[str, Trace, str, str, int]]:
     """Curves of a panel: name, trace, label, colour and the number of the dashes, that of the trace; where colours come
     again dashes go on.
     """
@@ -119,7 +119,7 @@ def in_order(names: Iterable[str]) -> list[str]:
     return sorted(parts, key=lambda name: [(int(p), p) if k % 2 else (0, p) for k, p in enumerate(parts[name])])
 
 
-def shortened(name: str, most: int) -> str:
+def abbreviate(name: str, most: int) -> str:
     """A name in at most so many characters: its beginning and its end."""
     return name if len(name) <= most else f"{name[: most - most // 3 - 1]}…{name[-(most // 3) :]}"
 

@@ -9,7 +9,7 @@ import warnings
 from collections.abc import Callable, Sequence
 from typing import Any
 
-from sysdyn.cli.page.panels import Panel, curve, panels_of, shortened, styled, time_unit, unit_text
+from sysdyn.cli.page.panels import Panel, abbreviate, curve, panels_of, styled_curves, time_unit, unit_text
 from sysdyn.dsl.text.render import printable
 from sysdyn.runtime.trace.trace import Trace
 
@@ -111,14 +111,15 @@ def _head(axes: Any, traces: Sequence[tuple[str, Trace]]) -> None:
 
 
 def _draw(axis: Any, panel: Panel, traces: Sequence[tuple[str, Trace]], scale: float) -> None:
+    """Draw the curves of a panel, with a legend where there are several."""
     curves = []
-    for name, trace, label, colour, k in styled(panel, traces):
+    for name, trace, label, colour, k in styled_curves(panel, traces):
         time, values = curve(trace, name, panel.unit)
         (line,) = axis.plot(time * scale, values, STYLES[k % len(STYLES)], color=colour)
-        curves.append((line, _legible(shortened(label, 2 * MOST))))
+        curves.append((line, _legible(abbreviate(label, 2 * MOST))))
     unit = unit_text(panel.unit)
     if len(panel.names) == 1:
-        axis.set_ylabel(", ".join(filter(None, [_legible(shortened(panel.names[0], MOST)), unit])))
+        axis.set_ylabel(", ".join(filter(None, [_legible(abbreviate(panel.names[0], MOST)), unit])))
     else:
         axis.set_ylabel(unit)
     if len(curves) > 1:

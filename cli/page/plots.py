@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 from sysdyn.cli.page.document import document, escape
-from sysdyn.cli.page.panels import Floats, Panel, curve, panels_of, styled, time_unit, unit_text
+from sysdyn.cli.page.panels import Floats, Panel, curve, panels_of, styled_curves, time_unit, unit_text
 from sysdyn.runtime.trace.trace import Trace
 
 SCRIPT = "plots.js"
@@ -62,8 +62,8 @@ def figures(traces: Sequence[tuple[str, Trace]], names: Sequence[str]) -> str:
 
 def _panel(panel: Panel, traces: Sequence[tuple[str, Trace]], scale: float, arrays: _Arrays) -> dict[str, Any]:
     curves = []
-    for name, trace, shown, colour, k in styled(panel, traces):
-        time, values = thinned(*curve(trace, name, panel.unit), arrays.most)
+    for name, trace, shown, colour, k in styled_curves(panel, traces):
+        time, values = thin(*curve(trace, name, panel.unit), arrays.most)
         places = {"time": arrays.add(time * scale), "values": arrays.add(values)}
         curves.append({"label": shown, "colour": colour, "dash": k % 2 == 1, **places})
     name, unit = panel.names[0] if len(panel.names) == 1 else "", unit_text(panel.unit)
@@ -89,7 +89,7 @@ class _Arrays:
         return self._places[raw]
 
 
-def thinned(time: Floats, values: Floats, most: int) -> tuple[Floats, Floats]:
+def thin(time: Floats, values: Floats, most: int) -> tuple[Floats, Floats]:
     """At most about `most` points: the first, the last, and least and largest of equal parts of the span."""
     if time.size <= most:
         return time, values

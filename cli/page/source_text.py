@@ -18,11 +18,11 @@ _CLASSES = {1: "c", 2: "s", 3: "n", 4: "w"}
 
 def block(text: str) -> str:
     """A whole text as HTML, without numbers of lines."""
-    lines = "\n".join(highlighted(line) for line in text.rstrip("\n").split("\n"))
+    lines = "\n".join(highlight(line) for line in text.rstrip("\n").split("\n"))
     return f'<pre class="source plain">{lines}</pre>'
 
 
-def highlighted(line: str) -> str:
+def highlight(line: str) -> str:
     """One line as HTML: comments, texts, numbers and words of the language marked."""
     found, end = [], 0
     for match in _TOKEN.finditer(line):

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-from sysdyn.cli.page.columns import aligned
+from sysdyn.cli.page.columns import align
 from sysdyn.cli.page.panels import Floats, curve, time_unit, unit_text
 from sysdyn.runtime.trace.trace import Trace
 
@@ -19,6 +19,7 @@ def summary(traces: Sequence[tuple[str, Trace]], names: Sequence[str], width: in
     rows: list[tuple[str, ...]] = [("quantity", "unit", "min", "max")]
     curves: list[tuple[Floats, Floats]] = []
     for name in names:
+        # a row for each trace that has the quantity
         for label, trace in traces:
             if name not in trace:
                 continue
@@ -27,7 +28,8 @@ def summary(traces: Sequence[tuple[str, Trace]], names: Sequence[str], width: in
             shown = name if len(traces) == 1 else f"{name}, {label}"
             rows.append((_plain(shown), _plain(unit_text(trace[name].units)) or "1", *ends))
             curves.append(curve(trace, name))
-    heads = aligned(rows, right=(2, 3)).split("\n")
+    heads = align(rows, right=(2, 3)).split("\n")
+    # numbers first: curves take the columns that are left
     room = max(map(len, heads))
     wide = max(width - room - 2, NARROW)
     scale, unit = time_unit([t for _, t in traces])

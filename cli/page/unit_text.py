@@ -6,7 +6,7 @@ import re
 from fractions import Fraction
 from functools import lru_cache
 
-from sysdyn.dsl.model.units import DEGREE_CELSIUS, NONE, Unit, known, multiply, raised
+from sysdyn.dsl.model.units import DEGREE_CELSIUS, NONE, Unit, find_unit, multiply, power_of
 
 _TOKEN = re.compile(r"\s*(?:(\d+(?:\.\d+)?(?:[eE][-+]?\d+)?)|([^\W\d_]+|%)|(\*\*|[./*^()+-]))")
 _LONGEST = 200
@@ -56,6 +56,7 @@ def read_unit(text: str) -> Unit | None:
 
 
 def _product(tokens: list[re.Match[str]], k: int) -> tuple[Unit, int]:
+    """Unit of the factors from token k on up to a bracket that closes, and the token behind them."""
     total, k = _factor(tokens, k)
     while k < len(tokens) and tokens[k].group(3) != ")":
         operator = tokens[k].group(3)
@@ -69,16 +70,19 @@ def _product(tokens: list[re.Match[str]], k: int) -> tuple[Unit, int]:
 
 
 def _factor(tokens: list[re.Match[str]], k: int) -> tuple[Unit, int]:
+    """Unit of one factor with its power, and the token behind it; ValueError where there is none."""
     number, name, operator = tokens[k].groups()
+    # a group
     if operator == "(":
         unit, k = _product(tokens, k + 1)
         if tokens[k].group(3) != ")":
             raise ValueError(")")
     elif number:
         unit = Unit(NONE, Fraction(number), "")
+    # an unknown unit is a base of its own: it equals itself
     elif name:
         name = _ALIASES.get(name, name)
-        found = known(name)
+        found = find_unit(name)
         unit = Unit(*found, name) if found else Unit(((name, Fraction(1)),), Fraction(1), name)
     else:
         raise ValueError(operator)
@@ -86,11 +90,12 @@ def _factor(tokens: list[re.Match[str]], k: int) -> tuple[Unit, int]:
     if not -30 <= power <= 30:
         raise ValueError("power")
     scale = unit.scale**power if isinstance(power, int) else Fraction(float(unit.scale) ** float(power))
-    return Unit(raised(unit.dimension, power), scale, ""), k
+    return Unit(power_of(unit.dimension, power), scale, ""), k
 
 
 def _power(tokens: list[re.Match[str]], k: int) -> tuple[int | Fraction, int]:
     """`^2`, `**-1`, `^1.5`, `^1/3`, or a number that follows at once: `m2`, `s-1`."""
+    # ^2, **-1, ^(1/2)
     if k < len(tokens) and tokens[k].group(3) in ("^", "**"):
         k += 1
         bracket = tokens[k].group(3) == "("
@@ -103,6 +108,7 @@ def _power(tokens: list[re.Match[str]], k: int) -> tuple[int | Fraction, int]:
         if bracket and tokens[k + 1].group(3) != ")":
             raise ValueError(")")
         return int(power) if power.denominator == 1 else power.limit_denominator(1000), k + 1 + bracket
+    # m2, s-1: a number that follows at once
     close = k < len(tokens) and tokens[k].start() == tokens[k - 1].end() and bool(tokens[k - 1].group(2))
     if close and tokens[k].group(1) and tokens[k].group(1).isdigit():
         return int(tokens[k].group(1)), k + 1

@@ -53,7 +53,7 @@ SAID = ("accuracy", "formulation", "index", "level", "method", "redundancy", "sc
 """What a scene says, with words of its own or as the scene that is named."""
 
 
-def configured(arguments: Sequence[str], commands: Iterable[str]) -> dict[str, Any]:
+def project_defaults(arguments: Sequence[str], commands: Iterable[str]) -> dict[str, Any]:
     """What the project's file says, as click's map of defaults for each of the commands; {} where there is none.
 
     Raises UsageError with file and key where the file says what it cannot.
@@ -129,17 +129,21 @@ def _read(path: Path, table: str, key: str, value: Any) -> tuple[str, Any]:
     if key not in known:
         raise UsageError(f"{where} has no key '{key}'{_instead(table, key)}")
     name, kind = known[key]
+    # one of several words
     if isinstance(kind, tuple):
         if value not in kind:
             raise UsageError(f"{where} {key} = {value!r}: one of {', '.join(kind)}")
+    # files, relative to the project's file
     elif kind is list:
         if not isinstance(value, list) or not all(isinstance(item, str) for item in value):
             raise UsageError(f"{where} {key} = {value!r}: a list of texts")
         value = [item for said in value for item in _files(path.parent, said, f"{where} {key}")]
+    # a folder, likewise
     elif key == "folder" and isinstance(value, str):
         if "\0" in value:
             raise UsageError(f"{where} {key} = {value!r}: no name of a folder")
         value = str(_relative(path.parent / value))
+    # true is no number, and a whole number is one
     elif isinstance(value, bool) != (kind is bool) or not isinstance(value, (kind, int) if kind is float else kind):
         names = {bool: "true or false", int: "a whole number", float: "a number", str: "a text"}
         raise UsageError(f"{where} {key} = {value!r}: {names[kind]}")

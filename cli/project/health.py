@@ -66,6 +66,7 @@ def examine() -> Iterator[Finding]:
 
 
 def _versions() -> Iterator[Finding]:
+    """Versions of sysdyn, Python and packages; another project's files in the same place."""
     yield Finding("sysdyn", "ok", f"{sysdyn.__version__}, {Path(__file__).parents[2]}")
     others = list(importlib.metadata.distributions(name=distribution.TAKEN))
     if others:
@@ -93,6 +94,7 @@ def _core() -> Iterator[Finding]:
 
 
 def _compiler() -> Iterator[Finding]:
+    """Whether a C compiler is there and makes a library, and how long it takes."""
     from sysdyn.compiler.program import build
 
     help_ = "install gcc or clang, or set CC; until then models run by --backend numpy"
@@ -111,7 +113,7 @@ def _compiler() -> Iterator[Finding]:
 def _cache() -> Iterator[Finding]:
     from sysdyn.compiler.program import cache
 
-    folder, wanted = cache.folder(), cache.wanted()
+    folder, wanted = cache.folder(), cache.requested_folder()
     entries = [p.stat().st_size for p in folder.glob("model-*.so")]
     said = f"{folder}: {len(entries)} models, {sum(entries) / 1e6:.1f} of {cache.limit() / 1e6:.0f} MB"
     if folder != wanted:
@@ -121,6 +123,7 @@ def _cache() -> Iterator[Finding]:
 
 
 def _hdf5() -> Iterator[Finding]:
+    """Whether trace files can be written and read, and the room for them."""
     import shutil
 
     import h5py
@@ -144,6 +147,7 @@ def _runs() -> Iterator[Finding]:
 
 
 def _run(backend: str) -> Finding:
+    """A swing of three seconds by one backend against its closed form."""
     from sysdyn.cli.run.request.asked import Request
     from sysdyn.cli.run.running import run
     from sysdyn.dsl.text.diagnostics import Report
@@ -156,11 +160,13 @@ def _run(backend: str) -> Finding:
         end = math.nan if ran is None else float(ran.outcome.traced["x"].values[-1])
     took = time.monotonic() - began
     name = f"run ({backend})"
+    # it does not run here
     if ran is None or report.failed:
         return Finding(name, "error", "; ".join(f"{d.code}: {d.message}" for d in report) or "it did not run")
     error = abs(end - math.cos(2.0 * 3.0))
     said = f"a swing of 3 s in {took:.2f} s, off by {error:.1e} of its amplitude"
     notes = [d.message for d in report if d.code == "N609"]
+    # it runs, and is wrong
     if not error <= NEAR:
         return Finding(name, "error", said, "this machine computes something else than others: please report it")
     return Finding(name, "warning", "; ".join([said, *notes])) if notes else Finding(name, "ok", said)

@@ -24,7 +24,7 @@ FILES = {
 GOLDEN_SCENE = "free"
 
 
-def named(folder: Path) -> str:
+def model_name(folder: Path) -> str:
     """The name of model and file that a project in this folder has; UsageError where no model can be called so."""
     name = re.sub(r"[-. ]", "_", folder.name)
     if parse(SourceText("name", f"model {name} {{\n}}\n"))[1] or not name.isidentifier():
@@ -34,7 +34,7 @@ def named(folder: Path) -> str:
 
 def write(folder: Path) -> list[Path]:
     """Write the files of a new project; those written.  UsageError where there is something already."""
-    name = named(folder)
+    name = model_name(folder)
     if folder.exists() and (not folder.is_dir() or any(folder.iterdir())):
         raise UsageError(f"{folder} is there already and not empty: another name, or an empty folder")
     python = ".".join(platform.python_version_tuple()[:2])

@@ -14,7 +14,7 @@ from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
-from sysdyn.cli.report.balance import Part, observed, shares
+from sysdyn.cli.report.balance import Part, add_observations, shares
 from sysdyn.cli.run.prepare import prepare
 from sysdyn.cli.run.request.asked import Request, of_these_alone, options_of
 from sysdyn.cli.run.request.targets import Target
@@ -74,12 +74,14 @@ def activities(
         options = options_of(request, target, prepared, report, began, progress) if prepared else None
         if prepared is None or options is None or report.failed:
             return None
-        network, parts = observed(prepared.network)
+        # an integral of power for each part
+        network, parts = add_observations(prepared.network)
         if not parts:
             report.error("E608", "the powers of the elements cannot be written: there is none, or they are too many",
                          prepared.network.place)  # fmt: skip
             return None
         own = prepared.network.traced
+        # many instants: activity is an integral of an absolute value
         cells = np.linspace(options.t_start, options.t_end, CELLS + 1)[1:-1]
         options = replace(
             options,
@@ -90,17 +92,20 @@ def activities(
             sampled_at=(),
             max_wall=limit,
         )
+        # the accuracy is that of the author's own quantities
         options = of_these_alone(options, own)
         inner = Report()
         rich = prepare(network, inner, formulation=prepared.formulation, backend=prepared.backend, traced=True)
         ran = None if rich is None else integrate(target, rich, options, inner)
+    # stopped: no activities
     if ran is None or not ran.outcome.final:
         report.extend(inner)
         return None
-    return _sorted(ran.outcome.traced, parts, ran)
+    return _rank_activities(ran.outcome.traced, parts, ran)
 
 
-def _sorted(trace: Trace, parts: Sequence[Part], ran: Ran) -> Activities:
+def _rank_activities(trace: Trace, parts: Sequence[Part], ran: Ran) -> Activities:
+    """Activities of all parts with their shares, the largest first."""
     found = [(part, variation(trace.time, trace[part.name])) for part in parts]
     total = float(sum(value for part, value in found if part.role != "through"))
     # shares of jumps follow those of the parts, and are no part of the model

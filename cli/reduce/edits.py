@@ -44,6 +44,7 @@ def candidates(target: Target, network: Network, found: Sequence[Activity]) -> t
     source = target.document.file.source
     groups: dict[tuple[int, int], list[Activity]] = {}
     owners: dict[tuple[int, int], syntax.Statement] = {}
+    # parts of one statement together: an array goes as a whole
     for activity in found:
         statement = _statement(target, activity)
         if statement is not None:
@@ -53,13 +54,16 @@ def candidates(target: Target, network: Network, found: Sequence[Activity]) -> t
     made = []
     for key, group in groups.items():
         statement = owners[key]
+        # sources drive the model
         if all(a.role in ("in", "through") for a in group):
             continue
         name = statement.decl.name if isinstance(statement, syntax.Instance) else ""
         several = sum(isinstance(s, syntax.Instance) and s.decl.name == name for s in target.model.body) > 1
         value, share = sum(a.activity for a in group), sum(a.share for a in group)
         label = group[0].label if several else name or group[0].label
-        made.append(Candidate(label, value, share, key, "" if several else name, _joined(source, statement, network)))
+        made.append(
+            Candidate(label, value, share, key, "" if several else name, _zero_source(source, statement, network))
+        )
     return tuple(sorted(made, key=lambda c: (c.activity, c.span)))
 
 
@@ -80,7 +84,7 @@ def _statement(target: Target, activity: Activity) -> syntax.Statement | None:
     return next((s for s in target.model.body if s.span.start == place.span.start), None)
 
 
-def _joined(source: SourceText, statement: syntax.Statement, network: Network) -> str:
+def _zero_source(source: SourceText, statement: syntax.Statement, network: Network) -> str:
     """`label: effort(e = 0 V) a -> b`, or of zero flow where nodes have a common flow."""
     if not isinstance(statement, syntax.Instance) or statement.decl.indices or len(statement.connections) != 1:
         return ""
@@ -100,19 +104,19 @@ def _source(branch: Branch) -> str:
     return f"flow(f = 0 {domain.flow.text})"
 
 
-def without(target: Target, text: str, candidate: Candidate) -> str:
+def remove_statement(target: Target, text: str, candidate: Candidate) -> str:
     """The text without a statement, and without the initial values of what it declares."""
     cuts = [(*candidate.span, ""), *((*span, "") for span in _initials(target, candidate.name))]
-    return changed(text, cuts)
+    return apply_cuts(text, cuts)
 
 
-def joined(target: Target, text: str, candidate: Candidate) -> str:
+def replace_by_zero_source(target: Target, text: str, candidate: Candidate) -> str:
     """The text with a source of zero in the element's place."""
     cuts = [(*candidate.span, candidate.joined), *((*span, "") for span in _initials(target, candidate.name))]
-    return changed(text, cuts)
+    return apply_cuts(text, cuts)
 
 
-def merged(target: Target, text: str, candidate: Candidate) -> str | None:
+def merge_nodes(target: Target, text: str, candidate: Candidate) -> str | None:
     """The text with the ends of an element as one node, named by the first; None where that cannot be said.
 
     What lies between the two goes: elements with both ends there.  A node of which anything but the ends of elements
@@ -125,9 +129,9 @@ def merged(target: Target, text: str, candidate: Candidate) -> str | None:
     if len(ends) != 2 or not all(re.fullmatch(r"\w+", end) for end in ends):
         return None
     for stays, goes in (ends, ends[::-1]):
-        node = _declared(target, goes)
+        node = _node_statement(target, goes)
         if node is not None and stays != goes and _spoken(target, text, goes) == 0:
-            return changed(text, [*_renamed(target, text, goes, stays), *_undeclared(text, node, goes)])
+            return apply_cuts(text, [*_rename_cuts(target, text, goes, stays), *_declaration_cuts(text, node, goes)])
     return None
 
 
@@ -142,7 +146,7 @@ def _ends(text: str, connection: syntax.Connection) -> list[str]:
     )
 
 
-def _declared(target: Target, name: str) -> syntax.Node | None:
+def _node_statement(target: Target, name: str) -> syntax.Node | None:
     """The scalar node of that name that the model declares."""
     nodes = (s for s in target.model.body if isinstance(s, syntax.Node))
     return next((s for s in nodes if any(d.name == name and not d.indices for d in s.decls)), None)
@@ -162,7 +166,7 @@ def _spoken(target: Target, text: str, name: str) -> int:
     return whole - ends - 1
 
 
-def _renamed(target: Target, text: str, goes: str, stays: str) -> Iterator[Cut]:
+def _rename_cuts(target: Target, text: str, goes: str, stays: str) -> Iterator[Cut]:
     """Cuts that put one node for another at the ends of elements, and take away what then has both ends there."""
     word = re.compile(rf"{NO_MEMBER}{re.escape(goes)}(?!\w)")
     for statement in dict.fromkeys(s for s, _ in _connections(target)):
@@ -177,7 +181,7 @@ def _renamed(target: Target, text: str, goes: str, stays: str) -> Iterator[Cut]:
                 yield connection.span.start, connection.span.end, new
 
 
-def _undeclared(text: str, node: syntax.Node, name: str) -> Iterator[Cut]:
+def _declaration_cuts(text: str, node: syntax.Node, name: str) -> Iterator[Cut]:
     """Cuts that take a name out of a declaration."""
     if len(node.decls) == 1:
         yield node.span.start, node.span.end, ""
@@ -198,7 +202,7 @@ def _initials(target: Target, name: str) -> Iterator[tuple[int, int]]:
                 yield s.span.start, s.span.end
 
 
-def changed(text: str, cuts: Sequence[Cut]) -> str:
+def apply_cuts(text: str, cuts: Sequence[Cut]) -> str:
     """The text after cuts; a line of which nothing is left goes with its comment."""
     for first, last, instead in sorted(cuts, reverse=True):
         if not instead:
@@ -220,7 +224,7 @@ def unread(target: Target, text: str, before: str) -> str:
             name = s.decl.name
             if _read(before, name) > 1 and _read(text, name) == 1:
                 cuts.append((s.span.start, s.span.end, ""))
-    return changed(text, cuts)
+    return apply_cuts(text, cuts)
 
 
 def _read(text: str, name: str, *, of: bool = False) -> int:

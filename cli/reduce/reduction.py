@@ -97,13 +97,15 @@ def reduce(
     if request.rtol is not None or request.atol is not None:
         raise UsageError("reduce measures errors: --accuracy says what is wanted")
     began = time.monotonic()
-    target = targets.asked(request, report)
+    # the text and its activities
+    target = targets.target_of(request, report)
     if target is None:
         return None
     found = activities(request, target, report, folder, began, None, budget)
     if found is None:
         return None
     text = target.document.file.source.text
+    # no trials
     if only:
         return Reduced(target.name, request.accuracy or ACCURACY, found, (), text, 0.0, None, None, True)
     limit = None if budget is None else began + budget
@@ -137,7 +139,7 @@ class _Reduction:
             return None
         self.reference = ran.outcome.traced
         full = self._cost(self.target)
-        reduced, error, ended = self._tried(text)
+        reduced, error, ended = self._reduce_text(text)
         cost = full
         if reduced != text:
             final = self._target(reduced)
@@ -146,14 +148,16 @@ class _Reduction:
         found = self.found
         return Reduced(self.target.name, self.accuracy, found, tuple(self.trials), reduced, error, full, cost, ended)
 
-    def _tried(self, original: str) -> tuple[str, float, bool]:
+    def _reduce_text(self, original: str) -> tuple[str, float, bool]:
         """The reduced text, its error, whether the budget sufficed."""
         text, error, misses = original, 0.0, 0
         gone: set[str] = set()
         planned = [c for c in self._candidates(text) if c.share <= LARGEST]
+        # from the least active on
         for number, first in enumerate(planned):
             if self.limit is not None and time.monotonic() > self.limit:
                 return text, error, False
+            # several in a row were needed: so are those that are more active
             if misses >= MISSES:
                 break
             target = self._target(text)
@@ -161,6 +165,7 @@ class _Reduction:
             if target is None or candidate is None or candidate.label in gone:
                 continue
             kept = None
+            # left out, ends joined, or replaced by a source of zero: the first that does no harm
             for how, made in self._variants(target, text, candidate):
                 trial = self._trial(candidate, how, made)
                 self.trials.append(trial)
@@ -186,12 +191,13 @@ class _Reduction:
         return () if network is None else edits.candidates(target, network, self.found.items)
 
     def _variants(self, target: Target, text: str, candidate: edits.Candidate) -> list[tuple[str, str]]:
-        made = [("left out", edits.without(target, text, candidate))]
-        one = edits.merged(target, text, candidate)
+        """Texts without an element: left out, ends as one node, or a source of zero; without what is then unread."""
+        made = [("left out", edits.remove_statement(target, text, candidate))]
+        one = edits.merge_nodes(target, text, candidate)
         if one is not None:
             made.append(("ends one", one))
         if candidate.joined:
-            made.append(("joined", edits.joined(target, text, candidate)))
+            made.append(("joined", edits.replace_by_zero_source(target, text, candidate)))
         clean = []
         for how, new in made:
             after = self._target(new)
@@ -199,24 +205,27 @@ class _Reduction:
         return clean
 
     def _trial(self, candidate: edits.Candidate, how: str, text: str) -> Trial:
+        """Run a changed text and measure its error against the reference; kept where it is within the accuracy."""
         report = Report()
         target = self._target(text, report)
         error, reason = None, ""
         ran = None if target is None else self._run(target, "trial", FINER, report)
         assert self.reference is not None
+        # met: judged by its error
         if ran is not None and ran.outcome.met:
             trace = ran.outcome.traced
             until = float(self.reference.time[-1])
             error = error_of(trace, self.reference, self.judged, self.accuracy, until)
             reason = "" if error <= self.accuracy else "it takes part: the error is beyond the accuracy"
             error = error if math.isfinite(error) else None
+        # refused or not met: why
         else:
             errors = [d.message for d in report if d.severity == "error"]
             reason = errors[0] if errors else "its run is not met"
         return Trial(candidate.label, how, candidate.activity, candidate.share, error, not reason, reason)
 
     def _target(self, text: str, report: Report | None = None) -> Target | None:
-        """The same model and scene in another text; imports and tables are found beside the file."""
+        """Model and scene of the target in another text; imports and tables are found beside the file."""
         inner = Report() if report is None else report
         document = load.document(SourceText(self.target.document.file.source.name, text), inner)
         scene = self.target.scene.name.name if self.target.scene else None
@@ -237,6 +246,7 @@ class _Reduction:
             asked = [options.accuracy or ACCURACY, *(a for _, a in options.accuracy_on)]
             self.accuracy = min(asked)
             on = tuple((n, finer * a) for n, a in options.accuracy_on)
+            # both runs at the same instants, finer than the accuracy
             options = replace(
                 options,
                 output=self.folder / f"{name}.h5",
@@ -246,6 +256,7 @@ class _Reduction:
                 accuracy_on=on,
                 max_wall=None if self.limit is None else max(self.limit - began, 1e-3),
             )
+            # where accuracies are asked of some quantities, these alone count
             named = tuple(n for n, _ in on) if options.accuracy is None else ()
             self.judged = named or prepared.network.traced
             try:

@@ -68,9 +68,11 @@ def flows(items: Iterable[Activity]) -> Flows:
     enters: dict[str, dict[tuple[str, str], list[float]]] = {}
     leaves: dict[str, dict[tuple[str, str], list[float]]] = {}
     sides: dict[str, list[tuple[str, float]]] = {}
+    # what enters and leaves the bus of each domain
     for a in items:
         enters.setdefault(a.domain, {})
         leaves.setdefault(a.domain, {})
+        # two-ports pass energy from bus to bus
         if a.role == "through":
             sides.setdefault(a.name.partition("#")[0] or a.label, []).append((a.domain, a.energy))
             continue
@@ -78,13 +80,15 @@ def flows(items: Iterable[Activity]) -> Flows:
         side = enters if inward else leaves
         side[a.domain].setdefault((_component(a), a.role), []).append(abs(a.energy))
     passes = tuple(p for label, ends in sides.items() for p in _passes(label, ends))
+    # a bus is as high as the larger of both sides
     size = {
-        name: max(_total(enters[name]) + _moved(passes, name, into=True),
-                  _total(leaves[name]) + _moved(passes, name, into=False))
+        name: max(_total(enters[name]) + _passed_energy(passes, name, into=True),
+                  _total(leaves[name]) + _passed_energy(passes, name, into=False))
         for name in enters
     }  # fmt: skip
     least = THIN * max(size.values(), default=0.0)
-    net = {n: _moved(passes, n, into=True) - _moved(passes, n, into=False) for n in enters}
+    net = {n: _passed_energy(passes, n, into=True) - _passed_energy(passes, n, into=False) for n in enters}
+    # from where energy comes to where it goes
     order = sorted(enters, key=lambda name: (net[name], name))
     buses = (Bus(n, size[n], _stubs(enters[n], least), _stubs(leaves[n], least)) for n in order if size[n] > 0.0)
     return Flows(tuple(buses), tuple(p for p in passes if p.energy > 0.0))
@@ -100,7 +104,7 @@ def _total(stubs: Mapping[tuple[str, str], Sequence[float]]) -> float:
     return sum(map(sum, stubs.values()))
 
 
-def _moved(passes: Iterable[Pass], name: str, *, into: bool) -> float:
+def _passed_energy(passes: Iterable[Pass], name: str, *, into: bool) -> float:
     return sum(p.energy for p in passes if (p.target if into else p.source) == name and p.source != p.target)
 
 
@@ -173,6 +177,7 @@ def _draw(axis: Any, where: Flows) -> None:
         axis.text(0.5, 0.5, "no energy moves", ha="center", transform=axis.transAxes)
         return
     left, right = dict.fromkeys(places, 0.0), dict.fromkeys(places, 0.0)
+    # ribbons between buses, the largest on top
     for p in sorted(where.passes, key=lambda p: -p.energy):
         size = p.energy / most
         a, b = right[p.source], left[p.target]
@@ -182,6 +187,7 @@ def _draw(axis: Any, where: Flows) -> None:
         right[p.source] += size
         left[p.target] += size
     lowest = 0.0
+    # bars, and stubs of what enters and leaves
     for bus in where.buses:
         x, size = places[bus.name], bus.size / most
         axis.fill([x - 0.02, x + 0.02, x + 0.02, x - 0.02], [0, 0, -size, -size], color="#30343b")

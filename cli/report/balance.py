@@ -19,7 +19,7 @@ from sysdyn.dsl.model import dimensions as dim
 from sysdyn.dsl.model.calculus import differential, rate
 from sysdyn.dsl.model.expression import Node, add, const, index, mul, neg, sub, substitute, var
 from sysdyn.dsl.model.network import Branch, Dynamic, Energy, Initial, Loop, Network, Observation, State, Work
-from sysdyn.dsl.model.rewriting import summed
+from sysdyn.dsl.model.rewriting import sum_over_loops
 from sysdyn.dsl.model.units import si
 from sysdyn.dsl.text.diagnostics import ModelError, Place
 from sysdyn.runtime.trace.trace import Trace
@@ -69,7 +69,7 @@ class Share:
     place: Place | None
 
 
-def observed(network: Network) -> tuple[Network, tuple[Part, ...]]:
+def add_observations(network: Network) -> tuple[Network, tuple[Part, ...]]:
     """The network with a quadrature and an observation of each part; what cannot be written is left out."""
     parts: list[Part] = []
     for found in (*_of_branches(network.branches), *_of_statements(network)):
@@ -78,6 +78,7 @@ def observed(network: Network) -> tuple[Network, tuple[Part, ...]]:
             return network, ()
     unit = si(dim.ENERGY)
     states, dynamics, initials, extra = [], [], [], []
+    # a power is integrated by a state, an energy is observed as it is
     for part in parts:
         value = part.expression
         if part.power:
@@ -133,13 +134,15 @@ def _of_branches(branches: Sequence[Branch]) -> Iterator[list[Part]]:
         if first.kind not in ROLES or first.domain.pseudo:
             continue
         power = [
-            summed(mul(var(b.name, "be", *b.at), var(b.name, "bf", *b.at)), b.loops) for b in pieces if b.kind in ROLES
+            sum_over_loops(mul(var(b.name, "be", *b.at), var(b.name, "bf", *b.at)), b.loops)
+            for b in pieces
+            if b.kind in ROLES
         ]
-        label = f"{shown(name)}{_ranges(pieces)}"
+        label = f"{author_name(name)}{_ranges(pieces)}"
         yield [Part(f"power of {name}", label, ROLES[first.kind], True, add(*power), first.place, first.domain.name)]
 
 
-def shown(name: str) -> str:
+def author_name(name: str) -> str:
     """The name of a branch as an author knows it: `emf#2` is side 2 of emf."""
     own, _, side = name.partition("#")
     return f"{own}, side {side}" if side else own
@@ -155,6 +158,7 @@ def _ranges(pieces: Sequence[Branch]) -> str:
 
 
 def _of_statements(network: Network) -> Iterator[list[Part]]:
+    """Parts of energies and works, named by their line; those whose power cannot be written are left out."""
     counts: dict[str, int] = {}
     domains = {c.name: c.domain.name for c in network.coordinates if c.domain is not None}
     statements: tuple[Energy | Work, ...] = (*network.energies, *network.works)
@@ -164,6 +168,7 @@ def _of_statements(network: Network) -> Iterator[list[Part]]:
         label = f"{kind} (line {statement.place.start[0]})"
         try:
             role, power, value = _measure(statement)
+        # that statement is missing from the balance, not the page
         except (ModelError, ValueError):  # a product over a range has no derivative here
             continue
         domain = next((domains[n.data[0]] for n in local_variables(value, _KINDS) if n.data[0] in domains), "")
@@ -176,14 +181,14 @@ def _measure(statement: Energy | Work) -> tuple[str, bool, Node]:
         return "in", True, neg(_work(statement))
     if statement.function in ("D", "G"):
         return "out", True, _content(statement)
-    return "held", False, _stored(statement)
+    return "held", False, _stored_energy(statement)
 
 
-def _named(loops: Sequence[Loop], body: Node) -> Node:
+def _sum_with_own_names(loops: Sequence[Loop], body: Node) -> Node:
     """A sum over canonical loops, whose variables get names of their own."""
     change = {index(loop.index): index(f"of{loop.index}") for loop in loops}
     renamed = [Loop(f"of{loop.index}", substitute(loop.first, change), substitute(loop.last, change)) for loop in loops]
-    return summed(substitute(body, change), renamed)
+    return sum_over_loops(substitute(body, change), renamed)
 
 
 def _along(expression: Node, kinds: Sequence[str]) -> Node:
@@ -191,18 +196,18 @@ def _along(expression: Node, kinds: Sequence[str]) -> Node:
     return differential(expression, {f: f for f in local_variables(expression, kinds)})
 
 
-def _stored(statement: Energy) -> Node:
+def _stored_energy(statement: Energy) -> Node:
     pieces = []
     for term in terms(flows(statement.expression), statement.loops, statement.place):
         kinds = _RATES.get(statement.function)
         value = term.expression if kinds is None else sub(_along(term.expression, kinds), term.expression)
-        pieces.append(_named(term.loops, value))
+        pieces.append(_sum_with_own_names(term.loops, value))
     return add(*pieces)
 
 
 def _content(statement: Energy) -> Node:
     found = terms(flows(statement.expression), statement.loops, statement.place)
-    return add(*(_named(t.loops, _along(t.expression, _RATES[statement.function])) for t in found))
+    return add(*(_sum_with_own_names(t.loops, _along(t.expression, _RATES[statement.function])) for t in found))
 
 
 def _work(statement: Work) -> Node:
@@ -211,8 +216,8 @@ def _work(statement: Work) -> Node:
     for term in split(on, nest, statement.place):
         moving = local_variables(term.expression, ("q", "nq", "bq"))
         speed = differential(term.expression, {q: r for q in moving if (r := rate(q)) is not None})
-        pieces.append(_named(term.loops[len(nest) :], speed))
-    return _named(nest, mul(effort, add(*pieces)))
+        pieces.append(_sum_with_own_names(term.loops[len(nest) :], speed))
+    return _sum_with_own_names(nest, mul(effort, add(*pieces)))
 
 
 # ---- the section
@@ -246,6 +251,7 @@ def joules(value: float) -> str:
 
 def _bars(parts: Sequence[Share]) -> str:
     """The largest as bars about zero."""
+    # the largest, in either direction
     drawn = sorted((p for p in parts if p.role != "through" and np.isfinite(p.energy)), key=lambda p: -abs(p.energy))
     drawn = [p for p in drawn[:24] if abs(p.energy) > 0.0]
     if not drawn:
@@ -256,6 +262,7 @@ def _bars(parts: Sequence[Share]) -> str:
     zero = left - low * scale
     height = step * len(drawn) + 8
     body = []
+    # a bar about zero, its name on the left and its number at its end
     for k, p in enumerate(drawn):
         x, w = zero + min(p.energy, 0.0) * scale, max(abs(p.energy) * scale, 0.5)
         y = 4 + step * k

@@ -8,7 +8,7 @@ from contextlib import contextmanager
 from dataclasses import replace
 
 from sysdyn.cli.failures import UsageError
-from sysdyn.cli.report.balance import Share, observed, shares
+from sysdyn.cli.report.balance import Share, add_observations, shares
 from sysdyn.cli.report.study import Study, sources_of
 from sysdyn.cli.run.prepare import Prepared, prepare
 from sysdyn.cli.run.request import targets
@@ -33,18 +33,18 @@ def collect(request: Request, report: Report, progress: Progress | None = None) 
     check_tolerances(request)
     stages: Stages = []
     began = time.monotonic()
-    with _timed("read", stages):
-        target = targets.asked(request, report)
+    with _time_stage("read", stages):
+        target = targets.target_of(request, report)
     if target is None:
         return None
-    with _timed("check", stages):
+    with _time_stage("check", stages):
         settings, levels = request.settings, request.levels
         inner = Report()
         network = load.network(target.document, target.model, target.scene, inner, settings, levels=levels)
-        report.extend(inner if network else targets.unsupported(inner))
+        report.extend(inner if network else targets.refuse_unsupported(inner))
     if network is None:
         return None
-    prepared = _prepared(request, network, report, stages)
+    prepared = _prepare(request, network, report, stages)
     if prepared is None:
         return None
     return _study(request, target, prepared, report, stages, began, progress)
@@ -59,21 +59,25 @@ def _study(
     began: float,
     progress: Progress | None,
 ) -> Study | None:
+    """Start and run a scene for the page, without a file; None where the report says why not."""
     scene = prepared.network.scene
     findings: list[str] = []
     ran, trace, found = None, None, None
+    # a scene without time: the start alone
     if request.until is None and (scene is None or scene.end is None):
-        with _timed("start", stages):
+        with _time_stage("start", stages):
             started = start(prepared, 0.0, report, request.redundancy)
         findings.append("There is no 'time' in the scene: nothing was run.")
     else:
         options = options_of(request, target, prepared, report, began, progress)
         if options is None:
             return None
+        # every step, in memory
         options = replace(options, output=None, every=None)
-        with _timed("start, integration and trace", stages):
+        with _time_stage("start, integration and trace", stages):
             ran = integrate(target, prepared, options, report)
         started = ran.started if ran is not None else None
+        # the energy balance takes a run of its own
         if ran is not None:
             trace = ran.outcome.traced
             _split(stages, ran)
@@ -88,10 +92,10 @@ def _study(
     )
 
 
-def _prepared(request: Request, network: Network, report: Report, stages: Stages) -> Prepared | None:
+def _prepare(request: Request, network: Network, report: Report, stages: Stages) -> Prepared | None:
     """Compiled, with the compiler's own stages."""
     made: Stages = []
-    with _timed("formulation, build and load", made):
+    with _time_stage("formulation, build and load", made):
         prepared = prepare(
             network, report, formulation=request.formulation, backend=request.backend, traced=True, gather=False
         )
@@ -120,14 +124,14 @@ def _energies(
     stages: Stages,
 ) -> tuple[Share, ...] | None:
     """A second run to the first one's accuracy, in which the power of every element is observed; None without."""
-    network, parts = observed(prepared.network)
+    network, parts = add_observations(prepared.network)
     if not parts or ran.failure or ran.outcome.timings.get("wall_integrate_s", 0.0) > LONG:
         return None
     # what is observed may have no underlying equation
     method = {"dopri": options.method, "energy": "auto"}.get(ran.outcome.method, ran.outcome.method)
     fixed = replace(options, method=method, progress=None)
     fixed = of_these_alone(fixed, prepared.network.traced)
-    with _timed("energies of the elements (a run of their own)", stages):
+    with _time_stage("energies of the elements (a run of their own)", stages):
         try:
             report = Report()
             rich = prepare(network, report, formulation=prepared.formulation, backend=prepared.backend, traced=True)
@@ -138,7 +142,7 @@ def _energies(
 
 
 @contextmanager
-def _timed(stage: str, stages: Stages) -> Iterator[None]:
+def _time_stage(stage: str, stages: Stages) -> Iterator[None]:
     wall, cpu = time.perf_counter(), time.process_time()
     yield
     stages.append((stage, time.perf_counter() - wall, time.process_time() - cpu))

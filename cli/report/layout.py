@@ -20,7 +20,9 @@ def places(neighbours: Mapping[str, Sequence[str]], size: Mapping[str, float]) -
     found: dict[str, tuple[int, float]] = {}
     below = 0.0
     left = dict.fromkeys(neighbours)
+    # one connected part below the other
     while left:
+        # from an end of a long path: layers are then narrow
         start = _end(neighbours, next(iter(left)))
         layers = _layers(neighbours, start)
         for layer in layers:
@@ -78,15 +80,17 @@ def _positions(
 ) -> dict[str, float]:
     """Each vertex near the mean of its neighbours, none over another, the order kept."""
     y: dict[str, float] = {}
+    # stacked at first
     for layer in layers:
         at = 0.0
         for vertex in layer:
             y[vertex] = at + size[vertex] / 2
             at += size[vertex]
+    # then drawn towards the neighbours, back and forth
     for _ in range(3 * SWEEPS):
         for layer in layers:
             wanted = [_mean([y[u] for u in neighbours[v]], y[v]) for v in layer]
-            for vertex, at in zip(layer, _apart(wanted, [size[v] for v in layer]), strict=True):
+            for vertex, at in zip(layer, _space_out(wanted, [size[v] for v in layer]), strict=True):
                 y[vertex] = at
     return y
 
@@ -95,7 +99,7 @@ def _mean(values: Sequence[float], default: float) -> float:
     return sum(values) / len(values) if values else default
 
 
-def _apart(wanted: Sequence[float], size: Sequence[float]) -> list[float]:
+def _space_out(wanted: Sequence[float], size: Sequence[float]) -> list[float]:
     """The places nearest to those wanted at which neighbours do not overlap: pool adjacent violators."""
     shift, total = [0.0], 0.0
     for a, b in pairwise(size):

@@ -24,10 +24,12 @@ def page(study: Study) -> str:
         ("balance", "Energy balance by element", _balance(study)),
         ("solver", "Solver", run.statistics(study) + "<h3>Time by stage</h3>" + run.stages(study)),
     ]
+    # where the text expects something
     claims = run.expectations(study)
     if claims:
         sections.insert(9, ("expectations", "Expectations", claims))
     links = "".join(f'<a href="#{key}">{escape(name)}</a>' for key, name, _ in sections)
+    # headline, findings and counts before the sections
     parts = [f"<h1>{escape(title)}</h1>", f'<p class="soft">{escape(_how(study))}</p>']
     parts += [f'<p class="bad">{escape(finding)}</p>' for finding in study.findings]
     parts += [run.counts(study), f"<nav>{links}</nav>"]

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from sysdyn.cli.equations.mathml import Typesetter, math, mi, mo, row
 from sysdyn.cli.page.document import escape, table
-from sysdyn.cli.report.balance import shown
+from sysdyn.cli.report.balance import author_name
 from sysdyn.cli.report.study import Study
 from sysdyn.dsl.model.expression import var
 from sysdyn.dsl.model.network import Branch
@@ -58,23 +58,27 @@ def _head(edge: str) -> str:
 
 
 def _of_branches(study: Study) -> list[list[str]]:
+    """Rows of Paynter's diagram for branches and couplings: the law at its edge."""
     types = study.typesetter_of_text
     rows = []
     for branch in study.network.branches:
         if branch.kind == "port":
             continue
-        name = study.link(branch.place, escape(shown(branch.name))) + _where(branch, types)
+        name = study.link(branch.place, escape(author_name(branch.name))) + _where(branch, types)
         cells = dict.fromkeys(EDGES, "")
+        # a law: at the edge of its kind
         if branch.law is not None and branch.side is not None and branch.kind in _EDGE:
             left = types.expression(var(branch.name, f"b{branch.side}", *branch.at))
             cells[_EDGE[branch.kind]] = math(left, mo("="), types.expression(branch.law))
+        # its laws are derivatives of a stated energy
         elif branch.kind == "field":
             cells["p-f"] = '<span class="soft">in the energies</span>'
         rows.append([name, escape(branch.domain.name), *cells.values()])
+    # a coupling relates efforts or flows of two branches
     for c in study.network.couplings:
         one = types.expression(var(c.first, f"b{c.side}", *c.at))
         two = types.expression(var(c.second, f"b{c.read}", *c.at))
-        law = math(one, mo("="), types.held(c.ratio), "<mspace width='.14em'/>", two)
+        law = math(one, mo("="), types.parenthesize(c.ratio), "<mspace width='.14em'/>", two)
         domains = [b.domain.name for name in (c.first, c.second) for b in study.network.branches if b.name == name]
         label = study.link(c.place, escape(c.first.partition("#")[0])) + f' <span class="soft">{c.kind}</span>'
         cells = dict.fromkeys(EDGES, "")
@@ -90,6 +94,7 @@ def _where(branch: Branch, types: Typesetter) -> str:
 
 
 def _of_statements(study: Study) -> list[list[str]]:
+    """Rows of Paynter's diagram for energies, works and constraints."""
     rows = []
     n = study.network
     for energy in n.energies:
@@ -101,7 +106,7 @@ def _of_statements(study: Study) -> list[list[str]]:
     types = study.typesetter_of_text
     for work in n.works:
         cells = dict.fromkeys(EDGES, "")
-        on = types.summed(work.loops, row(types.held(work.effort), mo("δ"), types.held(work.on)))
+        on = types.sum_over(work.loops, row(types.parenthesize(work.effort), mo("δ"), types.parenthesize(work.on)))
         cells["p'"] = math(on)
         rows.append([study.link(work.place, "work"), "", *cells.values()])
     for c in n.constraints:
@@ -144,7 +149,7 @@ def unknowns(study: Study) -> str:
     for family, known in zip(study.prepared.compiled.form.families, description.families, strict=False):
         if family.kind in BESIDE:
             continue
-        symbol = math(types.unknown(family.owner, family.kind, 0))
+        symbol = math(types.typeset_unknown(family.owner, family.kind, 0))
         name = study.link(family.place, escape(family.owner))
         rows.append([symbol, name, kinds[family.kind], escape(family.unit), str(count(known.shape))])
     more = f'<p class="soft">… {len(rows) - MOST} more</p>' if len(rows) > MOST else ""

@@ -6,7 +6,7 @@ import numpy as np
 from sysdyn.cli.page.document import escape, table
 from sysdyn.cli.report.study import Study
 from sysdyn.cli.run.start.author import names_of
-from sysdyn.cli.run.start.starting import moved
+from sysdyn.cli.run.start.starting import changes_by_start
 from sysdyn.compiler.binding.certificate import certificate
 from sysdyn.runtime.model.description import BESIDE
 from sysdyn.runtime.structure.order import freedom
@@ -29,6 +29,7 @@ def counts(study: Study) -> str:
     facts = study.started.facts
     index = "–" if facts.index is None else str(facts.index)
     solved = []
+    # the index that the method integrates, where there was a run
     if study.ran is not None:
         form = study.ran.outcome.index
         solved = [(_INDEX.get(form, form) if facts.index == 3 else form, "index solved")]
@@ -43,6 +44,7 @@ def counts(study: Study) -> str:
         *solved,
         (str(study.started.system.unknowns), "unknowns"),
     ]
+    # in the words of the other family
     if study.complementary:
         words = {"displacement constraints": "momentum constraints", "flow constraints": "effort constraints"}
         found = [(value, words.get(word, word)) for value, word in found]
@@ -54,7 +56,8 @@ def start(study: Study) -> str:
     """What the start changed, and where it begins."""
     state, system = study.started.state, study.started.system
     parts = []
-    moves = moved(study.prepared, state)
+    moves = changes_by_start(study.prepared, state)
+    # guesses are free to move, fixed values are not
     if moves:
         rows = [[escape(n), f"{before:.6g}", f"{after:.6g}", escape(why)] for n, before, after, why in moves]
         more = f'<p class="soft">… {len(rows) - SHOWN} more</p>' if len(rows) > SHOWN else ""
@@ -62,12 +65,14 @@ def start(study: Study) -> str:
         parts.append(table(("guess", "as written", "at the start", "why"), rows[:SHOWN], left=(0, 3)) + more)
     else:
         parts.append("<p>No written guess was moved.</p>")
+    # what the author could fix further
     more_values, guesses = freedom(system, state)
     if more_values > 0:
         names = ", ".join(guesses[:12]) + (" …" if len(guesses) > 12 else "")
         parts.append(f"<p>{more_values} more values could be fixed, among {escape(names)}.</p>")
     parts.append(f'<p class="soft">Largest scaled residual {state.residual:.1e} at t = {state.t:g} s.</p>')
     rows, position = [], 0
+    # values and rates of all unknowns, the first of many
     for family in system.description.families:
         for k in range(family.size):
             if family.kind not in BESIDE and position < state.y.size and len(rows) <= SHOWN:

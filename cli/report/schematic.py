@@ -70,7 +70,7 @@ class _Colours:
     def __init__(self) -> None:
         self._known: dict[str, str] = {}
 
-    def of(self, domain: str) -> str:
+    def colour_of(self, domain: str) -> str:
         """The colour of a domain."""
         return self._known.setdefault(domain, COLOURS[len(self._known) % len(COLOURS)])
 
@@ -81,11 +81,12 @@ class _Colours:
 
 
 def _vertices(study: Study, colours: _Colours) -> dict[str, Vertex]:
+    """Vertices of the drawing: nodes, coordinates, unknowns and states as dots, elements and statements as boxes."""
     n = study.network
     found: dict[str, Vertex] = {}
 
     def dot(name: str, shape: Shape, domain: str, place: Place) -> None:
-        found[f"n {name}"] = Vertex(f"n {name}", name + _extent(shape), "", colours.of(domain), place, False)
+        found[f"n {name}"] = Vertex(f"n {name}", name + _extent(shape), "", colours.colour_of(domain), place, False)
 
     for node in n.nodes:
         dot(node.name, node.shape, node.domain.name, node.place)
@@ -96,8 +97,10 @@ def _vertices(study: Study, colours: _Colours) -> dict[str, Vertex]:
     for s in n.states:
         dot(s.name, s.shape, "dynamic variable", s.place)
     kinds = {b.name: c.kind for c in n.couplings for b in n.branches if b.name in (c.first, c.second)}
+    # both sides of a coupling in one box
     for branch in n.branches:
         _branch(found, branch, kinds, colours)
+    # what a statement ties are its ports, elements that it reads are dashed
     for label, small, loops, place, nodes in _statements(study):
         key = f"s {label} {place.span.start}"
         while key in found:
@@ -115,12 +118,14 @@ def _branch(found: dict[str, Vertex], branch: Branch, kinds: dict[str, str], col
     """A branch as a box, or as one side of the box of its coupling."""
     own, _, side = branch.name.partition("#")
     key = f"b {own}"
-    colour = colours.of(branch.domain.name)
+    colour = colours.colour_of(branch.domain.name)
     vertex = found.get(key)
+    # the first side makes the box
     if vertex is None:
         small = kinds.get(branch.name, "") or _SIGNS.get(branch.kind, branch.kind)
         label = own + (f"[{_ranges(branch.loops) or '…'}]" if branch.at else "")
         vertex = found[key] = Vertex(key, label, small, colour, branch.place, True)
+    # ends at nodes are wires, ends at ground its sign
     for terminal, sign in ((branch.plus, "+"), (branch.minus, "−")):
         mark = sign + side
         if terminal is not None and terminal.node is None:
@@ -130,8 +135,10 @@ def _branch(found: dict[str, Vertex], branch: Branch, kinds: dict[str, str], col
             port = (f"n {terminal.node}", mark + _indices(terminal))
             if port not in vertex.ports and port[0] in found:
                 vertex.ports.append(port)
+    # along an expression: what that reads
     if branch.on is not None:
         vertex.ports += [(o, "") for o in _owners([branch.on], found) if (o, "") not in vertex.ports]
+    # a law that reads what is no port of it
     near = {p for p, _ in vertex.ports} | {key}
     vertex.reads |= {o for o in _owners([branch.law] if branch.law is not None else [], found) if o not in near}
 
@@ -178,14 +185,17 @@ def _indices(terminal: Terminal) -> str:
 
 
 def _draw(study: Study, vertices: dict[str, Vertex]) -> str:
+    """The drawing as SVG: vertices in layers, wires under boxes."""
     neighbours: dict[str, list[str]] = {key: [] for key in vertices}
     size: dict[str, float] = {}
+    # which dots each box is joined to
     for key, vertex in vertices.items():
         size[key] = (1.35 if vertex.grounds else 1.0) if vertex.box else 0.9
         for dot, _ in vertex.ports:
             if dot not in neighbours[key] and not vertices[dot].box:
                 neighbours[key].append(dot)
                 neighbours[dot].append(key)
+    # dots that nothing touches are left out
     drawn = {k: v for k, v in neighbours.items() if v or vertices[k].box}
     found = places(drawn, size)
     at = {k: (70.0 + layer * STEP, 26.0 + y * UNIT) for k, (layer, y) in found.items()}
@@ -200,6 +210,7 @@ def _draw(study: Study, vertices: dict[str, Vertex]) -> str:
 
 
 def _wires(vertices: dict[str, Vertex], at: dict[str, tuple[float, float]]) -> list[str]:
+    """Curves from boxes to their dots, signs at their beginning; dashed ones for what is read."""
     parts: list[str] = []
     for key, vertex in vertices.items():
         if not vertex.box or key not in at:
@@ -212,6 +223,7 @@ def _wires(vertices: dict[str, Vertex], at: dict[str, tuple[float, float]]) -> l
             u, v = at[port]
             side = 1.0 if u >= x else -1.0
             start = x + side * BOX / 2
+            # several wires to one dot leave the box one under the other
             nth = used[(port, side)] = used.get((port, side), -1) + 1
             rise = y + (7.0 * nth if nth % 2 == 0 else -7.0 * nth)
             middle = (start + u) / 2
@@ -221,6 +233,7 @@ def _wires(vertices: dict[str, Vertex], at: dict[str, tuple[float, float]]) -> l
             anchor = "start" if side > 0 else "end"
             spot = f'x="{start + 3 * side:.0f}" y="{rise - 3:.0f}" text-anchor="{anchor}"'
             parts.append(f'<text class="small" {spot}>{escape(mark)}</text>' if mark else "")
+        # what is read, as an arc above
         for other in sorted(vertex.reads):
             if other in at:
                 u, v = at[other]
@@ -231,6 +244,7 @@ def _wires(vertices: dict[str, Vertex], at: dict[str, tuple[float, float]]) -> l
 
 
 def _box(study: Study, vertex: Vertex, x: float, y: float) -> str:
+    """A box with its label and kind, its grounds below, linked to its line of the text."""
     shape = f'x="{x - BOX / 2:.0f}" y="{y - 17:.0f}" width="{BOX:.0f}" height="34" rx="4"'
     body = [f'<rect class="box" {shape} stroke="{vertex.colour}"/>']
     for kind, down, text in (("label", -2, _short(vertex.label, 13)), ("small", 11, _short(vertex.small, 17))):
@@ -242,16 +256,16 @@ def _box(study: Study, vertex: Vertex, x: float, y: float) -> str:
         body.append(f'<path class="wire" stroke="{vertex.colour}" d="M{u:.0f} {y + 17:.0f}v8{bars}"/>')
         body.append(f'<text class="small" x="{u + 4:.0f}" y="{y + 25:.0f}">{escape(mark)}</text>')
     title = f"<title>{escape(vertex.label)}</title>"
-    return _linked(study, vertex.place, title + "".join(body))
+    return _link(study, vertex.place, title + "".join(body))
 
 
 def _dot(study: Study, vertex: Vertex, x: float, y: float) -> str:
     circle = f'<circle class="node" cx="{x:.0f}" cy="{y:.0f}" r="5.5" fill="{vertex.colour}"/>'
     text = f'<text class="label" x="{x:.0f}" y="{y - 10:.0f}" text-anchor="middle">{_short(vertex.label, 16)}</text>'
-    return _linked(study, vertex.place, f"<title>{escape(vertex.label)}</title>{circle}{text}")
+    return _link(study, vertex.place, f"<title>{escape(vertex.label)}</title>{circle}{text}")
 
 
-def _linked(study: Study, place: Place | None, body: str) -> str:
+def _link(study: Study, place: Place | None, body: str) -> str:
     address = study.address(place)
     return f"<g>{body}</g>" if address is None else f'<a href="{address}">{body}</a>'
 

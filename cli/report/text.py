@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 
 from sysdyn.cli.page.document import escape
-from sysdyn.cli.page.source_text import highlighted
+from sysdyn.cli.page.source_text import highlight
 from sysdyn.cli.report.study import Study
 from sysdyn.dsl.text.source import SourceText
 
@@ -23,7 +23,7 @@ def section(study: Study) -> str:
 def _text(source: SourceText, number: int) -> str:
     lines = source.text.splitlines() if "\r" not in source.text else re.split(r"\r\n|\r|\n", source.text)
     made = (
-        f'<span class="line" id="L{number}-{k}" data-n="{k}">{highlighted(line) or " "}</span>'
+        f'<span class="line" id="L{number}-{k}" data-n="{k}">{highlight(line) or " "}</span>'
         for k, line in enumerate(lines, 1)
     )
     return f'<pre class="source">{"".join(made)}</pre>'

@@ -68,7 +68,7 @@ class _Planner:
         """Everything that may happen."""
         network, switches = self.prepared.network, self.prepared.compiled.network.switches
         whens = tuple(self._when(e) for e in network.events if e.condition is not None)
-        sampled = tuple(self._sampled(e) for e in network.events if e.period is not None)
+        sampled = tuple(self._sample_plan(e) for e in network.events if e.period is not None)
         number = count()
         contacts = tuple(self._contact(next(number) if s.holds is None else -1, s) for s in switches)
         limits = dict(network.scene.limits) if network.scene else {}
@@ -87,7 +87,10 @@ class _Planner:
         assert event.condition is not None
         return When(event.name, self._condition(event.condition), self._assignments(event.actions))
 
-    def _sampled(self, event: Event) -> Sampled:
+    def _sample_plan(self, event: Event) -> Sampled:
+        """Plan of an `every`: its period [s] and assignments; E703 of a period that is none, or is below what is told
+        apart.
+        """
         assert event.period is not None
         period = self.prepared.binding.evaluate(event.period)
         if not 0.0 < period < math.inf:
@@ -112,31 +115,37 @@ class _Planner:
         return tuple(self._assignment(a) for a in actions)
 
     def _assignment(self, action: Action) -> Assignment:
+        """Place and row of an assignment: a discrete variable is among parameters, a state or flow among unknowns."""
         row, target = self.row[action.value], action.target
         if target.op == "param":
-            return Assignment(self._shown(target.data, target), "discrete", self.prepared.place(target), row)
+            return Assignment(self._indexed_name(target.data, target), "discrete", self.prepared.place(target), row)
         name, kind, _ = target.data
+        # a flow that this formulation has replaced
         if (name, kind) not in self.unknown:
             text = f"an event assigns the flow of {name}, which is no unknown of this formulation"
             raise ModelError([Diagnostic("E702", text, action.place)])
         first, shape = self.unknown[name, kind]
-        shown = self._shown(name, target) + "'" * (kind == "f")
+        shown = self._indexed_name(name, target) + "'" * (kind == "f")
         place = first + position_of(shape, self.prepared.indices(target))
         return Assignment(shown, "state" if kind == "s" else "flow", place, row)
 
-    def _shown(self, name: str, node: Node) -> str:
+    def _indexed_name(self, name: str, node: Node) -> str:
         return f"{name}[{', '.join(map(str, self.prepared.indices(node)))}]" if node.args else name
 
     def _contact(self, number: int, s: Switch) -> Contact:
+        """Plan of a switch: rows that it watches, its sense, restitution and directions by place."""
+
         def row(name: str | None) -> int:
             return -1 if name is None else self.row[name]
 
         restitution = 0.0 if s.restitution is None else self.prepared.binding.evaluate(s.restitution)
+        # known with the parameters alone
         if not 0.0 <= restitution <= 1.0:
             text = f"phi {s.name}: restitution {restitution:g} is not between 0 and 1"
             raise ModelError([Diagnostic("E514", text, s.place)])
         sense = -1 if s.sense is None else self.prepared.place(s.sense)
         related, aim = s.kind == "relation", tuple(self.row[name] for name in s.aim)
+        # a relation whose bound is a reaction
         if related and aim:
             self.relations.append(Relation(aim[0], True))
         kind = "friction" if related else s.kind

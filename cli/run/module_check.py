@@ -50,6 +50,9 @@ def check_module(prepared: Prepared, started: Started, until: float) -> None:
 
 
 def _compare(prepared: Prepared, started: Started, until: float) -> None:
+    """Compare compiled rows with interpreted ones at the start and at points nearby; raise ModuleFault where they
+    differ.
+    """
     system = started.system
     oracle = SampledRows(prepared.compiled.form, prepared.binding)
     whole = system.of_blocks("start")  # it has all families
@@ -57,18 +60,20 @@ def _compare(prepared: Prepared, started: Started, until: float) -> None:
     for block in prepared.compiled.form.blocks:
         sample = oracle.sample(block, points)
         module = _module_rows(whole, oracle, block, points, sample.rows)
-        wrong = _apart(module, sample, points)
+        wrong = _differing_points(module, sample, points)
+        # compare with the size of the terms
         if wrong.any():  # perhaps terms of terms cancel: their rounding is no difference
             sample = oracle.sample(block, points, careful=True)
-            wrong = _apart(module, sample, points) & ~_beyond(points, prepared.binding.p)
+            wrong = _differing_points(module, sample, points) & ~_beyond(points, prepared.binding.p)
+        # the first row that differs
         if wrong.any():
             k, row = np.argwhere(wrong)[0]
             place = int(sample.rows[row])
             values = float(module[k, row]), float(sample.value[k, row])
-            raise ModuleFault(_told(prepared, oracle, block, place, values))
+            raise ModuleFault(_difference_text(prepared, oracle, block, place, values))
 
 
-def _apart(found: Array, sample: Sample, points: Points) -> NDArray[np.bool_]:
+def _differing_points(found: Array, sample: Sample, points: Points) -> NDArray[np.bool_]:
     """Where both differ by more than rounding [points, rows of the sample]; found: the module's rows there."""
     with np.errstate(invalid="ignore"):
         apart = np.abs(found - sample.value)
@@ -104,11 +109,13 @@ def _points(system: System, whole: System, started: Started, oracle: SampledRows
     order = _order(whole)
     number = 1 + len(NEARBY)
     points = Points(np.full(number, t0), np.zeros((number, order.size)), np.zeros((number, order.size)))
+    # large models give back what they do not need now
     if system.unknowns > LARGE:  # the room counts
         system.spare()
         system.put_away(whole=True)
     later = 0.5 + 0.5 * uniform(number)
     points.t[:] += np.array([0.0, *NEARBY]) * (until - t0) * later
+    # unknowns and rates, each moved by a part of its magnitude
     for which, (target, x) in enumerate(((points.y, y), (points.yd, yd))):
         beside = order.size - x.size
         x = np.concatenate([x, np.zeros(beside)])
@@ -147,7 +154,10 @@ def _module_rows(system: System, oracle: SampledRows, block: Block, points: Poin
     return found
 
 
-def _told(prepared: Prepared, oracle: SampledRows, block: Block, place: int, values: tuple[float, float]) -> str:
+def _difference_text(
+    prepared: Prepared, oracle: SampledRows, block: Block, place: int, values: tuple[float, float]
+) -> str:
+    """The message of a row that differs, with its statement and both values."""
     family = int(np.searchsorted(oracle.to, place, side="right")) - 1
     row = prepared.compiled.form.rows[family]
     where = f", {row.place.file}:{row.place.start[0]}" if row.place else ""

@@ -11,7 +11,7 @@ from typing import Any
 
 from sysdyn.compiler.binding.binding import Binding, places_of
 from sysdyn.compiler.formulations import choose
-from sysdyn.compiler.network.pruning import Removal, pruned
+from sysdyn.compiler.network.pruning import Removal, prune_network
 from sysdyn.compiler.pipeline import CompiledModel, compile_network
 from sysdyn.compiler.program import build
 from sysdyn.dsl import load
@@ -116,9 +116,11 @@ def prepare(
     """
     cpu = time.process_time()
     whole, place = network, None
-    network, left_out = pruned(whole) if prune else (whole, ())
+    # what is left out must be well-formed all the same
+    network, left_out = prune_network(whole) if prune else (whole, ())
     if left_out and not _well_formed(whole, report):
         return None
+    # the scene's own, with its place for findings
     if formulation is None:
         formulation = (network.scene.formulation if network.scene else None) or "auto"
         place = network.scene.formulation_place if network.scene else None
@@ -126,8 +128,9 @@ def prepare(
     report.extend(load.at_authors(network, found))
     if found:
         return None
+    # lowering may find what the rules of the text did not
     try:
-        compiled, made, backend = _compiled(network, chosen, backend, report, traced, gather)
+        compiled, made, backend = _compile_and_load(network, chosen, backend, report, traced, gather)
         binding = compiled.bind()
     except ModelError as error:
         report.extend(load.at_authors(network, error.diagnostics))
@@ -150,9 +153,10 @@ def _well_formed(network: Network, report: Report) -> bool:
     return not any(d.severity == "error" for d in found)
 
 
-def _compiled(
+def _compile_and_load(
     network: Network, formulation: str, backend: str, report: Report, traced: bool, gather: bool
 ) -> tuple[CompiledModel, Carrier, str]:
+    """Compile and load a network by C, or by NumPy where there is no compiler, which N609 notes."""
     if backend == "c":
         compiled = compile_network(network, formulation, "c", traced=traced, gather=gather)
         try:

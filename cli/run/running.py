@@ -20,7 +20,7 @@ from sysdyn.cli.run.request.targets import Target
 from sysdyn.cli.run.start.flat_laws import impossible
 from sysdyn.cli.run.start.starting import Started, start
 from sysdyn.cli.run.verdict.expectations import Claim, judge
-from sysdyn.cli.run.verdict.verdict import author_place, differences, stopped, unkicked, verdict
+from sysdyn.cli.run.verdict.verdict import author_place, differences, note_rest, report_stop, verdict
 from sysdyn.compiler.forms.kane import repeats
 from sysdyn.dsl import load
 from sysdyn.dsl.model import budget
@@ -63,13 +63,13 @@ def run(request: Request, report: Report, progress: Progress | None = None) -> R
     check_tolerances(request)
     if request.output and request.file != "-" and _same(request.output, request.file):
         raise UsageError(f"-o {request.output} is the model itself")
-    target = targets.asked(request, report)
+    target = targets.target_of(request, report)
     if target is None:
         return None
     output = request.output or default_output(request.file, target.scene.name.name if target.scene else "")
     if Path(output).is_file() and not replaceable(output):
         raise UsageError(f"-o {output} exists and is no trace of sysdyn: give another name, or remove it")
-    request, locked = _locked(request, target, report)
+    request, locked = _apply_lock(request, target, report)
     with ex.fresh():
         prepared = ready(request, target, report)
         options = None if prepared is None else options_of(request, target, prepared, report, began, progress)
@@ -78,12 +78,12 @@ def run(request: Request, report: Report, progress: Progress | None = None) -> R
         return None if prepared is None or options is None else integrate(target, prepared, options, report)
 
 
-def _locked(request: Request, target: Target, report: Report) -> tuple[Request, lock.Taken | None]:
+def _apply_lock(request: Request, target: Target, report: Report) -> tuple[Request, lock.Taken | None]:
     """The request with what the file's lock says where neither it nor the scene does."""
     held = None if request.no_lock else lock.read(request.file, target, __version__, report)
     if held is None:
         return request, None
-    found = lock.taken(held, target, request.formulation, request.index, request.method, request.levels)
+    found = lock.settings_from_lock(held, target, request.formulation, request.index, request.method, request.levels)
     return replace(
         request,
         formulation=request.formulation or found.formulation,
@@ -112,7 +112,7 @@ def ready(request: Request, target: Target, report: Report) -> Prepared | None:
         message = f"formulation {prepared.formulation}: the same rows as Lagrange's, no flow constraint is left out"
         inner.error("E607", message, prepared.network.place)
         prepared = None
-    report.extend(inner if prepared else targets.unsupported(inner))
+    report.extend(inner if prepared else targets.refuse_unsupported(inner))
     return prepared
 
 
@@ -136,7 +136,7 @@ def begin(prepared: Prepared, options: Options, report: Report, *, checked: bool
         return None
     number = started.system.form.written
     if number * budget.STEPPED > budget.there():
-        need, most = (budget.shown(amount) for amount in (number * budget.STEPPED, budget.there()))
+        need, most = (budget.format_bytes(amount) for amount in (number * budget.STEPPED, budget.there()))
         text = f"a run of {number} unknowns needs {need}, and there are {most}"
         report.error("E119", text, prepared.network.place, help="fewer elements")
         return None
@@ -166,6 +166,7 @@ def _same(one: str, other: str) -> bool:
 
 
 def _ran(target: Target, prepared: Prepared, started: Started, options: Options, report: Report) -> Ran | None:
+    """Integrate a started model, judge claims and report; None where its form does not exist."""
     failure = None
     try:
         outcome = simulate(
@@ -177,21 +178,24 @@ def _ran(target: Target, prepared: Prepared, started: Started, options: Options,
         return None
     except WrongOption as error:
         raise UsageError(str(error)) from error
+    # it stopped: what was computed until then is the outcome
     except SolverFailure as error:
         if not isinstance(error.partial, Outcome):
             raise
         outcome = error.partial
-        failure = stopped(target, prepared, started, error, report, options)
+        failure = report_stop(target, prepared, started, error, report, options)
     found = Report()
     claims = judge(prepared, outcome, found, finished=outcome.reached >= options.t_end)
+    # claims are judged of a run that is met
     if outcome.judgement is None or outcome.met:
         report.extend(found)
         code = 3 if failure else 1 if report.failed else 0
     else:  # what such a run says of the author's claims is not believed
         claims, code = tuple(replace(claim, ok=None) for claim in claims), 3
+    # what the run says of itself, and what looks odd
     if outcome.judgement is not None:
         verdict(target, prepared, started, outcome, report)
         differences(prepared, outcome.cancelled, report)
         zeno(prepared, outcome.events, report)
-        unkicked(prepared, started, outcome, report)
+        note_rest(prepared, started, outcome, report)
     return Ran(target, prepared, started, outcome, claims, code, failure)

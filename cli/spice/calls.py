@@ -41,6 +41,7 @@ class Calls:
         names = _parameters(netlist.top)
         way, on = [netlist.top], {netlist.top}
         opened: dict[Circuit, tuple[Use, Iterator[tuple[Card, Circuit]]]] = {}
+        # depth first: a circuit after those that it calls
         while way:
             circuit = way[-1]
             if circuit not in opened:
@@ -51,8 +52,9 @@ class Calls:
             if call is None:
                 self._finish(circuit, use, names)
                 on.discard(way.pop())
+            # a subcircuit that contains itself
             elif call[1] in on:
-                raise _at(call[0], f"'{call[1].name}' is inside itself")
+                raise _unreadable(call[0], f"'{call[1].name}' is inside itself")
             elif call[1] not in self.uses:
                 way.append(call[1])
                 on.add(call[1])
@@ -62,7 +64,7 @@ class Calls:
         inner = [self.uses[c] for c in dict.fromkeys(c for _, c in use.calls)]
         use.height = 1 + max((u.height for u in inner), default=0)
         if use.height > DEEPEST:
-            raise _at(use.calls[0][0], f"subcircuits are within each other more than {DEEPEST} deep")
+            raise _unreadable(use.calls[0][0], f"subcircuits are within each other more than {DEEPEST} deep")
         elsewhere, alone = _readings(circuit, names)
         elsewhere = elsewhere.union(*(u.reads for u in inner))
         use.reads = elsewhere | alone.keys()
@@ -130,7 +132,7 @@ def _readings(circuit: Circuit, names: set[str]) -> tuple[set[str], dict[str, st
     return elsewhere & names, {n: u for n, u in alone.items() if n in names}
 
 
-def _at(card: Card, reason: str) -> Unreadable:
+def _unreadable(card: Card, reason: str) -> Unreadable:
     error = Unreadable(reason)
     error.card = card
     return error

@@ -10,7 +10,7 @@ from sysdyn.cli.spice.netlist import Card, Unreadable, value
 from sysdyn.cli.spice.writing import plain, quantity
 
 
-def controlled(kind: str, letter: str, unit: str, *, by_current: bool) -> Callable[[Card, Scope], Element]:
+def controlled_source(kind: str, letter: str, unit: str, *, by_current: bool) -> Callable[[Card, Scope], Element]:
     """E, G, F, H: an effort or a flow that is a gain or a polynomial of voltages or currents."""
 
     def element(card: Card, scope: Scope) -> Element:
@@ -18,6 +18,7 @@ def controlled(kind: str, letter: str, unit: str, *, by_current: bool) -> Callab
         name, a, b = scope.name[card.head], scope.node(words[1]), scope.node(words[2])
         times, words = _times(words, scope, kind == "flow")
         size = 1 if by_current else 2
+        # POLY(n) reads n quantities, a gain one
         count, rest = (_order(words), words[5:]) if words[3:4] == ("poly",) else (1, words[3:])
         controls, numbers = rest[: size * count], rest[size * count :]
         if "=" in words or any("=" in w for w in words) or len(controls) < size * count or not numbers:
@@ -28,8 +29,10 @@ def controlled(kind: str, letter: str, unit: str, *, by_current: bool) -> Callab
             for k in range(count)
         ]
         gains = [times * value(w, scope.known) for w in numbers]
+        # a polynomial
         if words[3:4] == ("poly",):
             text = _polynomial(gains, read, "A" if by_current else "V", "V" if kind == "effort" else "A")
+        # something behind the gain
         elif len(gains) > 1:
             raise Unreadable(f"'{card.text[:60]}': '{numbers[1]}' behind the gain is not known")
         else:
@@ -60,6 +63,7 @@ def _polynomial(gains: list[float], read: list[str], unit: str, result: str) -> 
     if len(gains) == 1:
         raise Unreadable("POLY with one number: a gain in SPICE2, a constant in ngspice; '0 GAIN' or no POLY is both's")
     terms, degree, at = [plain(gains[0])], 1, 1
+    # all products of one degree before those of the next
     while at < len(gains):
         for factors in combinations_with_replacement(read, degree):
             if at < len(gains) and gains[at] != 0.0:
@@ -90,9 +94,9 @@ def _between(scope: Scope, plus: str, minus: str) -> str:
 
 
 CONTROLLED: dict[str, Callable[[Card, Scope], Element]] = {
-    "e": controlled("effort", "e", "", by_current=False),
-    "g": controlled("flow", "f", "S", by_current=False),
-    "f": controlled("flow", "f", "", by_current=True),
-    "h": controlled("effort", "e", "ohm", by_current=True),
+    "e": controlled_source("effort", "e", "", by_current=False),
+    "g": controlled_source("flow", "f", "S", by_current=False),
+    "f": controlled_source("flow", "f", "", by_current=True),
+    "h": controlled_source("effort", "e", "ohm", by_current=True),
 }
 """By the first letter of a name."""

@@ -86,7 +86,7 @@ class Details:
     given: dict[str, str]
     rest: tuple[str, ...]
 
-    def left(self, *read: str) -> tuple[str, ...]:
+    def unread_words(self, *read: str) -> tuple[str, ...]:
         """What a device does not read."""
         return (*self.rest, *(n for n in self.given if n not in (*read, "area", "m", "ic", "temp", "dtemp")))
 
@@ -106,6 +106,7 @@ def details(words: tuple[str, ...], scope: Scope, *, areas: bool) -> Details:
     left_ = [w for w in words if w != "off"]
     times, given, rest = 1.0, dict[str, str](), []
     while left_:
+        # NAME = VALUE, some with two values
         if left_[1:2] == ["="] and len(left_) > 2:
             name, _, text = left_[:3]
             given[name] = text
@@ -115,9 +116,11 @@ def details(words: tuple[str, ...], scope: Scope, *, areas: bool) -> Details:
             elif name in PAIRS and left_ and left_[1:2] != ["="] and _is_value(left_[0]):
                 given[f"{name} 2"] = left_[0]
                 left_ = left_[1:]
+        # a number alone is the area
         elif areas and _is_value(left_[0]):
             times *= value(left_[0], scope.known)
             left_ = left_[1:]
+        # words that the device may know
         else:
             rest.append(left_[0])
             left_ = left_[1:]
@@ -131,6 +134,8 @@ def _is_value(word: str) -> bool:
 
 
 def _passive(kind: str, letter: str, unit: str, state: str, state_unit: str) -> Callable[[Card, Scope], Element]:
+    """The reader of R, C and L cards: value with temperature and number, and the initial value where it is said."""
+
     def element(card: Card, scope: Scope) -> Element:
         words = enough(card, 4)
         named = words[3:5] == (letter.lower(), "=")
@@ -144,7 +149,7 @@ def _passive(kind: str, letter: str, unit: str, state: str, state_unit: str) -> 
         )
         factor *= said.times if kind == "capacitor" else 1.0 / said.times
         line = f"{name}: {kind}({letter} = {_amount(scope, amount, unit, factor)}) {a} -> {b}"
-        left = tuple(w for w in said.left("tc", "tc 2", "tc1", "tc2", "ic 2", "ac", "noisy") if w != "ac")
+        left = tuple(w for w in said.unread_words("tc", "tc 2", "tc1", "tc2", "ic 2", "ac", "noisy") if w != "ac")
         initial: tuple[str, ...] = ()
         if state and card.head not in scope.driven:
             initial = (f"init {name}.{_initial(state, state_unit, words, said, scope)}",)
@@ -173,12 +178,13 @@ def _initial(state: str, unit: str, words: tuple[str, ...], said: Details, scope
 
 
 def _source(unit: str) -> Callable[[Card, Scope], Element]:
+    """The reader of V and I cards."""
     kind, letter = ("voltage", "v") if unit == "V" else ("current", "i")
 
     def element(card: Card, scope: Scope) -> Element:
         words = enough(card, 3)
         name, a, b = scope.name[card.head], scope.node(words[1]), scope.node(words[2])
-        shape = _shape(_behind(card, 3), scope, unit)
+        shape = _shape(_words_after(card, 3), scope, unit)
         if shape.component:
             line = f"{name}: {shape.component}({shape.arguments}) {a} -> {b}"
             return Element((line,), () if shape.local else (shape.component,), (shape.component,) * shape.local)
@@ -187,7 +193,7 @@ def _source(unit: str) -> Callable[[Card, Scope], Element]:
     return element
 
 
-def _behind(card: Card, count: int) -> list[str]:
+def _words_after(card: Card, count: int) -> list[str]:
     """What stands behind so many words and the brackets among them."""
     words = list(card.words)
     while count and words:
@@ -206,11 +212,14 @@ def _shape(words: list[str], scope: Scope, unit: str) -> Shape:
     words = [w for w in words if w not in ("=", ",")]
     while words:
         word, words = words[0], words[1:]
+        # PULSE, SIN, PWL, ...
         if word in SHAPES and found is None:
             texts, words = _arguments(words)
             found = SHAPES[word]([value(w, scope.known) for w in texts], asked)
+        # AC and others: of analyses that are not made
         elif word in SMALL:
             words = words[sum(_is_value(w) for w in words[: SMALL[word]]) :]
+        # the constant value
         elif word != "dc" and constant is None and (_is_value(word) or word in scope.known):
             constant = value(word, scope.known)
         elif word != "dc":

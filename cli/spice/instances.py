@@ -64,7 +64,9 @@ class Instances:
         self.found = [top]
         self._known: dict[tuple[object, ...], Instance] = {}
 
-    def of(self, caller: Instance, card: Card, inner: Circuit, given: Mapping[str, float], at: list[str]) -> Instance:
+    def instance_of(
+        self, caller: Instance, card: Card, inner: Circuit, given: Mapping[str, float], at: list[str]
+    ) -> Instance:
         """The instance that a call with these values at these nodes makes; parameters that stay named are not its."""
         use = self.calls.uses[inner]
         own = {n: v for n, v in given.items() if n not in use.named}

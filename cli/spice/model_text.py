@@ -17,9 +17,9 @@ from sysdyn.cli.spice.scene_text import scene
 from sysdyn.cli.spice.semiconductors import SEMICONDUCTORS
 from sysdyn.cli.spice.starts import across_sources, held_nodes
 from sysdyn.cli.spice.temperature import Heat
-from sysdyn.cli.spice.windings import Cores, component, coupled
-from sysdyn.cli.spice.writing import Names, names, quantity, wrapped
-from sysdyn.dsl.elaborate.files import exported
+from sysdyn.cli.spice.windings import Cores, component, coupled_coils
+from sysdyn.cli.spice.writing import Names, names, quantity, wrap_lines
+from sysdyn.dsl.elaborate.files import library_components
 from sysdyn.dsl.elaborate.instances.instances import BUILTINS
 from sysdyn.dsl.text.decoding import MAX_BYTES
 from sysdyn.dsl.text.diagnostics import Report
@@ -76,7 +76,7 @@ class Writer:
         for node, (_, card) in self.netlist.initial.items():
             if "." not in node and node not in calls.uses[self.netlist.top].nodes:
                 self.report.error("E941", f".ic of '{node}': there is no such node", card.place)
-        library = {name for name, module in exported().items() if module == "electrical"}
+        library = {name for name, module in library_components().items() if module == "electrical"}
         coils = max((len(_coils(circuit)) for circuit in calls.uses), default=0)
         given = Names(library.union(BUILTINS, LOCAL, (f"coils_{n}" for n in range(2, coils + 1))), "x_")
         initial = {node: volt for node, (volt, _) in self.netlist.initial.items()} if self.netlist.uic else {}
@@ -103,6 +103,7 @@ class Writer:
         return next(iter(self.netlist.top.elements.values()))
 
     def _whole(self, model: str, body: list[str]) -> str:
+        """The model's text: imports, components, the top circuit, and the scene that its analysis asks for."""
         netlist, top = self.netlist, self.netlist.top
         asked = scene(netlist, model, self.names[top].nodes, self._read(top))
         if netlist.tran is not None and netlist.tran[2] > 0.0:
@@ -112,7 +113,7 @@ class Writer:
         imports = f"from std.electrical import {', '.join(sorted(self.written.uses))}\n" if self.written.uses else ""
         local = "\n".join(self._local(name) for name in dict.fromkeys(self.written.local))
         parts = [*head, imports, local, *self.written.components, f"model {model} {{", *body, "}", "", *asked]
-        text = wrapped("\n".join(parts) + "\n")
+        text = wrap_lines("\n".join(parts) + "\n")
         if len(text) > MAX_BYTES:
             message = f"the model's text would have {len(text)} characters; the language reads {MAX_BYTES}"
             self.report.error("E941", message, self.source.place(0, 0), help="a subcircuit for what repeats itself")
@@ -131,7 +132,7 @@ class Writer:
 
     # -- circuits --------------------------------------------------------------------------------------------------
 
-    def _named(self, circuit: Circuit, instances: Instances) -> _Names:
+    def _names_of(self, circuit: Circuit, instances: Instances) -> _Names:
         """Names of a circuit; where they are alike the earlier keeps its own."""
         if circuit not in self.names:
             use = instances.calls.uses[circuit]
@@ -147,7 +148,7 @@ class Writer:
         """Lines of a model or component."""
         circuit, netlist = instance.circuit, self.netlist
         cards = list(circuit.elements.values())
-        use, named = instances.calls.uses[circuit], self._named(circuit, instances)
+        use, named = instances.calls.uses[circuit], self._names_of(circuit, instances)
         lines = [f"  param {named.written[n]} = {quantity(instance.known[n], u)}" for n, u in use.named.items()]
         for kind, which in (("port", use.ports), ("node", [n for n in named.nodes if n not in use.ports])):
             lines += [f"  {kind} {', '.join(named.nodes[n] for n in which)}: electrical"] if which else []
@@ -158,7 +159,7 @@ class Writer:
         )  # fmt: skip
         cores = Cores(cards, _coils(circuit))
         initial: list[str] = []
-        held = self._held(cards, named) if circuit is netlist.top and not netlist.uic else {}
+        held = self._initial_lines(cards, named) if circuit is netlist.top and not netlist.uic else {}
         for card in cards:
             if card.head in cores.branches:
                 continue
@@ -167,7 +168,7 @@ class Writer:
             initial += [f"  {line}" for line in ([held[card.head]] if card.head in held else element.initial)]
         return [*lines, *initial]
 
-    def _held(self, cards: Iterable[Card], named: _Names) -> dict[str, str]:
+    def _initial_lines(self, cards: Iterable[Card], named: _Names) -> dict[str, str]:
         """By capacitor the line of `init` that `.ic` asks without UIC: a capacitor to ground holds the node."""
         held, rest = held_nodes(self.netlist.initial, cards)
         for node in (n for n in rest if n in named.nodes or "." in n):
@@ -176,12 +177,15 @@ class Writer:
         return {head: f"init {named.labels[head]}.e = {quantity(volt, 'V')}" for head, volt in held.items()}
 
     def _element(self, card: Card, scope: Scope, cores: Cores, write_call: Callable[[Card], Element]) -> Element:
+        """An element of a card; E941 of one that cannot be read, W941 of what is left out."""
         letter = card.head[0]
         try:
+            # a subcircuit
             if letter == "x":
                 found = write_call(card)
+            # coupled inductors
             elif letter == "k":
-                found = coupled(card, scope, cores)
+                found = coupled_coils(card, scope, cores)
             elif letter in DEVICES:
                 found = DEVICES[letter](card, scope)
             else:
@@ -209,15 +213,15 @@ class Writer:
             if key not in inner.parameters:
                 raise Unreadable(f"'{name}' has no parameter '{key}'")
             given[key] = value(text, instance.known)
-        found, use = instances.of(instance, card, inner, given, at), instances.calls.uses[inner]
-        inside = self._named(inner, instances)
+        found, use = instances.instance_of(instance, card, inner, given, at), instances.calls.uses[inner]
+        inside = self._names_of(inner, instances)
         said = (f"{inside.written[n]} = {quantity(v, use.named[n])}" for n, v in given.items() if n in use.named)
-        joined = _joined(inner, at, use.ports, self.netlist.shared)
+        joined = _nodes_by_port(inner, at, use.ports, self.netlist.shared)
         ends = ", ".join(f"{inside.nodes[p]} = {named.node(n)}" for p, n in joined.items())
         return Element((f"{named.labels[card.head]}: {found.name}({', '.join(said)}) {ends}",))
 
 
-def _joined(inner: Circuit, at: list[str], ports: Collection[str], shared: Mapping[str, None]) -> dict[str, str]:
+def _nodes_by_port(inner: Circuit, at: list[str], ports: Collection[str], shared: Mapping[str, None]) -> dict[str, str]:
     """Nodes of a call by port.  A node of `.global`, and ground, is that node inside too."""
     given = dict(zip(inner.ports, at, strict=True))
     for port, node in given.items():

@@ -93,10 +93,10 @@ def number(text: str) -> float | None:
     found = _NUMBER.fullmatch(text)
     if found is None:
         return None
-    return scaled(found[1], (found[2] or "").lower())
+    return scale_number(found[1], (found[2] or "").lower())
 
 
-def scaled(text: str, scale: str) -> float:
+def scale_number(text: str, scale: str) -> float:
     """A number with the letters of a scale; one of ten as if it were written out, so that 0.1n is 1e-10."""
     if scale == "mil":
         return float(text) * SCALES[scale]
@@ -129,6 +129,7 @@ def value(text: str, known: Mapping[str, float]) -> float:
 
 
 def _value(text: str, known: Mapping[str, float]) -> float:
+    """Number of a text: a literal, a parameter, or an expression of both; Unreadable otherwise."""
     plain = text.strip("{}'").strip()
     found = number(plain)
     if found is not None:
@@ -139,11 +140,12 @@ def _value(text: str, known: Mapping[str, float]) -> float:
         raise Unreadable(f"an expression of more than {MOST} characters")
 
     def written(match: re.Match[str]) -> str:
-        return repr(scaled(match[1], match[2] or ""))
+        return repr(scale_number(match[1], match[2] or ""))
 
     try:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")  # of literals that are none: they are findings here
+            # Python's parser reads it, and a walk allows what is allowed
             tree = ast.parse(_SCALED.sub(written, plain.replace("^", "**")), mode="eval")
         return _walk(tree.body, known)
     except (SyntaxError, ValueError, RecursionError, MemoryError):
@@ -153,6 +155,7 @@ def _value(text: str, known: Mapping[str, float]) -> float:
 
 
 def _walk(node: ast.AST, known: Mapping[str, float]) -> float:
+    """Value of a syntax tree of numbers, parameters, operators and functions; Unreadable of anything else."""
     if isinstance(node, ast.Constant) and isinstance(node.value, int | float):
         return float(node.value)
     if isinstance(node, ast.Name):

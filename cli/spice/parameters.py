@@ -36,12 +36,14 @@ def evaluate(
     around = ChainMap(found, dict(outer))
     for first in said:
         way, on = [first], {first}
+        # depth first: a parameter after those that its text needs
         while way:
             name = way[-1]
             needed = () if name in found else _missing(said, found, name)
+            # not known yet: itself on the way there is a circle
             if needed:
                 if needed[0] in on:
-                    raise _at(said[name].card, f"the parameter '{needed[0]}' depends on itself")
+                    raise _unreadable(said[name].card, f"the parameter '{needed[0]}' depends on itself")
                 way.append(needed[0])
                 on.add(needed[0])
                 continue
@@ -60,10 +62,10 @@ def _value(parameter: Parameter, known: Mapping[str, float]) -> float:
     try:
         return value(parameter.text, known)
     except Unreadable as error:
-        raise _at(parameter.card, str(error)) from None
+        raise _unreadable(parameter.card, str(error)) from None
 
 
-def _at(card: Card, reason: str) -> Unreadable:
+def _unreadable(card: Card, reason: str) -> Unreadable:
     error = Unreadable(reason)
     error.card = card
     return error

@@ -61,17 +61,21 @@ class Reader:
         self.report.error("E941", str(error), (error.card or card).place)
 
     def _card(self, source: SourceText, card: Card) -> None:
+        """Take a card into the circuit that is open; Unreadable where the card is wrong or not known."""
         head, words, inside = card.head, card.words, self._open[-1]
+        # an element
         if not head.startswith("."):
             _enter(inside.elements, head, card)
         elif head in (".param", ".params"):
             inside.parameters |= {name: Parameter(text, card) for name, text in pairs(words[1:])}
         elif head == ".subckt":
             self._begin(card)
+        # back to the circuit around
         elif head == ".ends":
             if len(self._open) == 1:
                 raise Unreadable(".ends without .subckt")
             self._open.pop()
+        # parentheses and commas separate as blanks do
         elif head == ".model":
             plain = [w for w in words if w not in ("(", ")", ",")]
             if len(plain) < 3:
@@ -79,20 +83,24 @@ class Reader:
             _enter(inside.models, plain[1], Model(plain[2], dict(pairs(plain[3:])), card))
         elif head == ".global":
             self.netlist.shared |= dict.fromkeys(words[1:])
+        # initial values name nodes of the top circuit
         elif head == ".ic" and inside is not self.netlist.top:
             raise Unreadable("'.ic' inside a subcircuit: IC= at its capacitors, or '.ic v(x1.node)=...' outside")
+        # analyses and options are read when all parameters are known
         elif head in ASKED:
             self._asked.append(card)
         elif head in (".print", ".plot", ".save", ".probe"):
-            self.netlist.shown += _shown(words[1:])
+            self.netlist.shown += _output_names(words[1:])
         elif head in (".include", ".inc", ".lib"):
             self._include(source, card)
+        # of analyses that are not made: named once
         elif head in SKIPPED:
             self._skipped.append(card)
         elif head not in IGNORED:
             raise Unreadable(f"'{head}' is not known")
 
     def _begin(self, card: Card) -> None:
+        """Open a subcircuit: its ports up to the first NAME=VALUE, then its parameters."""
         words = [w for w in card.words[1:] if w not in ("params", "params:", ":", "(", ")", ",")]
         if not words:
             raise Unreadable(".subckt NAME NODE ...")
@@ -101,6 +109,7 @@ class Reader:
         inner = Circuit(words[0], outer, tuple(words[1:first]))
         self._open.append(inner)  # also where it is refused below: its .ends is its own
         inner.parameters |= {name: Parameter(text, card) for name, text in pairs(words[first:])}
+        # one node under two names would be two
         if len(set(inner.ports)) < len(inner.ports):
             raise Unreadable(f"a node stands twice among those of '{words[0]}'")
         _enter(outer.inner, words[0], inner)
@@ -147,6 +156,7 @@ class Reader:
         self.report.warning("W941", text, card.place, help="IC= at capacitors and UIC say where a run begins")
 
     def _tran(self, card: Card, known: Mapping[str, float]) -> None:
+        """Read `.tran STEP STOP [START] [UIC]`, all in s."""
         words = [w for w in card.words[1:] if w not in ("(", ")", ",")]
         times = [value(w, known) for w in words if w != "uic"]
         if len(times) < 2:
@@ -175,6 +185,7 @@ class Reader:
 
     def _option(self, name: str, text: str, known: Mapping[str, float], card: Card) -> None:
         """Those that tell of the circuit are done or named; those of the solver have no counterpart."""
+        # degrees Celsius, as all of SPICE
         if name == "temp":
             self.netlist.temperature = _kelvin(text, known)
         elif name == "tnom":
@@ -183,9 +194,11 @@ class Reader:
             self.netlist.width = value(text, known)
         elif name == "defl":
             self.netlist.length = value(text, known)
+        # lengths of all devices
         elif name == "scale":
             if value(text, known) != 1.0:
                 raise Unreadable(f"the option scale={text}: lengths as they are, without it, are wanted")
+        # what it does is not known here
         elif name not in TOLERATED:
             text = f"the option '{name}' is not known and left out"
             self.report.warning("W941", text, card.place, help="the run differs from SPICE's by what it does")
@@ -229,7 +242,7 @@ def _nodes(words: tuple[str, ...], known: Mapping[str, float]) -> list[tuple[str
     return found
 
 
-def _shown(words: tuple[str, ...]) -> list[str]:
+def _output_names(words: tuple[str, ...]) -> list[str]:
     """`v(a)`, `v(a,b)`, `i(v1)` as `v a`, `v a b`, `i v1`."""
     text = " ".join(w for w in words if w != "tran")
     parts = text.replace("(", " ( ").replace(")", " ) ").split()

@@ -30,6 +30,7 @@ def _beyond(model: Values, read: tuple[str, ...]) -> tuple[str, ...]:
 
 
 def _diode(card: Card, scope: Scope) -> Element:
+    """A diode with its series resistance as an element and a node of its own."""
     words = enough(card, 4)
     name, a, b = scope.name[card.head], scope.node(words[1]), scope.node(words[2])
     model = _model(scope, words[3], ("d",))
@@ -37,11 +38,13 @@ def _diode(card: Card, scope: Scope) -> Element:
     emission, heat = v.get("n", 1.0), said.heat(scope, v.get("tnom"))
     if not emission > 0.0:
         raise Unreadable(f".model {words[3]}: n = {emission:g} is no emission coefficient")
+    # the saturation current of this area at this temperature
     current = v.get("is", 1e-14) * said.times * heat.saturation(v.get("eg", 1.11), v.get("xti", 3.0), emission)
     given = f"Is = {quantity(current, 'A')}, vT = {quantity(emission * heat.volt, 'V')}"
     read = ("is", "n", "rs", "eg", "xti", "tnom", "trs1", "trs2", "trs")
-    left = (*_beyond(model, read), *said.left())
+    left = (*_beyond(model, read), *said.unread_words())
     ohms = v.get("rs", 0.0) / said.times * heat.resistance(v.get("trs1", v.get("trs", 0.0)), v.get("trs2", 0.0))
+    # the junction lies behind a resistor
     if ohms > 0.0:
         inner = f"{name}_in"
         lines = (
@@ -56,6 +59,7 @@ def _diode(card: Card, scope: Scope) -> Element:
 def _bipolar(card: Card, scope: Scope) -> Element:
     """Ebers and Moll from the transport form: aF Ies = aR Ics = IS, aF = BF/(1 + BF)."""
     words = enough(card, 5)
+    # the substrate node is optional
     at = next((k for k in (4, 5) if k < len(words) and scope.model(words[k]) is not None), 4)
     model = _model(scope, words[at], ("npn", "pnp"))
     v, said = model.values, details(words[at + 1 :], scope, areas=True)
@@ -65,6 +69,7 @@ def _bipolar(card: Card, scope: Scope) -> Element:
     forward, backward = v.get("bf", 100.0) * gain, v.get("br", 1.0) * gain
     if not (forward > 0.0 and backward > 0.0):
         raise Unreadable(f".model {words[at]}: bf and br above 0 are wanted")
+    # gains of the common base circuit
     ahead, behind = forward / (1.0 + forward), backward / (1.0 + backward)
     volt = quantity(heat.volt * v.get("nf", 1.0), "V")
     given = (
@@ -73,7 +78,8 @@ def _bipolar(card: Card, scope: Scope) -> Element:
     )
     c, b, e = (scope.node(w) for w in words[1:4])
     name = scope.name[card.head]
-    left = (*_beyond(model, ("is", "bf", "br", "nf", "nr", "eg", "xti", "xtb", "tnom")), *said.left("ic 2"))
+    left = (*_beyond(model, ("is", "bf", "br", "nf", "nr", "eg", "xti", "xtb", "tnom")), *said.unread_words("ic 2"))
+    # one emission coefficient for both junctions
     if v.get("nr", 1.0) != v.get("nf", 1.0):
         left = ("nr", *left)
     if b in (c, e) and c != e:  # one junction is short: the other is a diode
@@ -81,6 +87,7 @@ def _bipolar(card: Card, scope: Scope) -> Element:
         ends = f"{b} -> {other}" if model.kind == "npn" else f"{other} -> {b}"
         law = f"Is = {quantity(current, 'A')}, vT = {volt}"
         return Element((f"{name}: diode({law}) {ends}",), ("diode",), (), (), left)
+    # the library has npn; pnp is written into the model
     uses, local = (("npn",), ()) if model.kind == "npn" else ((), ("pnp",))
     return Element((f"{name}: {model.kind}({given}) c = {c}, b = {b}, e = {e}",), uses, local, (), left)
 
@@ -121,7 +128,7 @@ def _sizes(said: Details, v: Mapping[str, float]) -> tuple[str, ...]:
     """What a card says beside width and length, where its model reads it."""
     unread = JUNCTIONS if not CAPACITIES & v.keys() else set()
     unread = unread if "rsh" in v else unread | {"nrd", "nrs"}
-    return tuple(w for w in said.left("w", "l", "ic 2") if w not in unread)
+    return tuple(w for w in said.unread_words("w", "l", "ic 2") if w not in unread)
 
 
 SEMICONDUCTORS: dict[str, Callable[[Card, Scope], Element]] = {"d": _diode, "q": _bipolar, "m": _mos}

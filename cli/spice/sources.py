@@ -32,7 +32,7 @@ STEEP = 1e-3
 """Share of a pulse that an edge takes where neither it nor a step is given."""
 
 
-def _at(values: list[float], k: int, default: float) -> float:
+def _value_or(values: list[float], k: int, default: float) -> float:
     return values[k] if k < len(values) else default
 
 
@@ -41,7 +41,7 @@ def direct(number: float, unit: str) -> Shape:
     return Shape(quantity(number, unit))
 
 
-def _known(v: list[float], most: int, form: str) -> None:
+def _check_count(v: list[float], most: int, form: str) -> None:
     """No value behind those of a shape."""
     if any(v[most:]):
         raise Unreadable(f"{form}: a value more than these, {v[most]:g}, is not known")
@@ -50,14 +50,19 @@ def _known(v: list[float], most: int, form: str) -> None:
 def _sine(v: list[float], asked: Asked) -> Shape:
     """SIN(VO VA FREQ TD THETA PHASE)."""
     unit, _, end = asked
-    _known(v, 6, "SIN(VO VA FREQ TD THETA PHASE)")
-    offset, size = _at(v, 0, 0.0), _at(v, 1, 0.0)
-    rate, delay, damping, phase = _at(v, 2, 0.0) or 1.0 / end, _at(v, 3, 0.0), _at(v, 4, 0.0), _at(v, 5, 0.0)
+    _check_count(v, 6, "SIN(VO VA FREQ TD THETA PHASE)")
+    offset, size = _value_or(v, 0, 0.0), _value_or(v, 1, 0.0)
+    rate, delay, damping, phase = (
+        _value_or(v, 2, 0.0) or 1.0 / end,
+        _value_or(v, 3, 0.0),
+        _value_or(v, 4, 0.0),
+        _value_or(v, 5, 0.0),
+    )
     time = "t" if delay == 0.0 else f"(t - {quantity(delay, 's')})"
-    angle = f"2*pi*{_held(quantity(rate, 'Hz'))}*{time}" + (f" + {plain(phase)}*pi/180" if phase else "")
-    wave = f"{_held(quantity(size, unit))}*sin({angle})"
+    angle = f"2*pi*{_as_factor(quantity(rate, 'Hz'))}*{time}" + (f" + {plain(phase)}*pi/180" if phase else "")
+    wave = f"{_as_factor(quantity(size, unit))}*sin({angle})"
     if damping:
-        wave += f"*exp(-{_held(quantity(damping, 'Hz'))}*{time})"
+        wave += f"*exp(-{_as_factor(quantity(damping, 'Hz'))}*{time})"
     begin = size * math.sin(math.radians(phase))
     if delay > 0.0:
         still = quantity(offset + begin, unit)
@@ -66,7 +71,7 @@ def _sine(v: list[float], asked: Asked) -> Shape:
     return Shape(wave if offset == 0.0 else f"{quantity(offset, unit)} + {wave}")
 
 
-def _held(text: str) -> str:
+def _as_factor(text: str) -> str:
     """A quantity as a factor."""
     return text if text.replace(".", "").isdigit() else f"({text})"
 
@@ -74,15 +79,15 @@ def _held(text: str) -> str:
 def _pulse(v: list[float], asked: Asked) -> Shape:
     """PULSE(V1 V2 TD TR TF PW PER); a period shorter than its pulse begins again in the midst of it."""
     unit, step, end = asked
-    _known(v, 7, "PULSE(V1 V2 TD TR TF PW PER)")
-    low, high, delay = _at(v, 0, 0.0), _at(v, 1, 0.0), _at(v, 2, 0.0)
-    width = _at(v, 5, 0.0) or end
-    edge = step or STEEP * min(width, _at(v, 6, 0.0) or end, end)
-    rise, fall = _at(v, 3, 0.0) or edge, _at(v, 4, 0.0) or edge
+    _check_count(v, 7, "PULSE(V1 V2 TD TR TF PW PER)")
+    low, high, delay = _value_or(v, 0, 0.0), _value_or(v, 1, 0.0), _value_or(v, 2, 0.0)
+    width = _value_or(v, 5, 0.0) or end
+    edge = step or STEEP * min(width, _value_or(v, 6, 0.0) or end, end)
+    rise, fall = _value_or(v, 3, 0.0) or edge, _value_or(v, 4, 0.0) or edge
     if not (rise > 0.0 and fall > 0.0 and width >= 0.0):
         raise Unreadable("PULSE: times of rising, falling and between them from 0 s on are wanted")
     whole = rise + width + fall
-    period = _at(v, 6, 0.0) or 2.0 * end + whole
+    period = _value_or(v, 6, 0.0) or 2.0 * end + whole
     period = max(period, whole) if delay + period >= end else period
     s = {"rise": rise, "fall": fall, "width": width, "period": period, "delay": delay}
     if unit == "V" and period >= whole * (1.0 - EXACT):
@@ -91,20 +96,20 @@ def _pulse(v: list[float], asked: Asked) -> Shape:
     at = f"mod(t - {quantity(delay, 's')}, {quantity(period, 's')})"
     down = f"({quantity(whole, 's')} - {at})/({quantity(fall, 's')})"
     shape = f"clip(min({at}/({quantity(rise, 's')}), {down}), 0, 1)"
-    moving = f"{quantity(low, unit)} + {_held(quantity(high - low, unit))}*{shape}"
+    moving = f"{quantity(low, unit)} + {_as_factor(quantity(high - low, unit))}*{shape}"
     return Shape(f"if t < {quantity(delay, 's')} then {quantity(low, unit)} else {moving}" if delay else moving)
 
 
 def _exponential(v: list[float], asked: Asked) -> Shape:
     """EXP(V1 V2 TD1 TAU1 TD2 TAU2)."""
     unit, step, _ = asked
-    _known(v, 6, "EXP(V1 V2 TD1 TAU1 TD2 TAU2)")
-    low, high = _at(v, 0, 0.0), _at(v, 1, 0.0)
-    one, tau = _at(v, 2, 0.0), _at(v, 3, 0.0) or step
-    two, fade = _at(v, 4, 0.0) or one + step, _at(v, 5, 0.0) or step
+    _check_count(v, 6, "EXP(V1 V2 TD1 TAU1 TD2 TAU2)")
+    low, high = _value_or(v, 0, 0.0), _value_or(v, 1, 0.0)
+    one, tau = _value_or(v, 2, 0.0), _value_or(v, 3, 0.0) or step
+    two, fade = _value_or(v, 4, 0.0) or one + step, _value_or(v, 5, 0.0) or step
     if not (tau > 0.0 and fade > 0.0):
         raise Unreadable("EXP: time constants above 0 s are wanted")
-    size = _held(quantity(high - low, unit))
+    size = _as_factor(quantity(high - low, unit))
 
     def side(delay: float, time: float, sign: str) -> str:
         behind = f"max(t - {quantity(delay, 's')}, 0 s)" if delay else "t"

@@ -24,9 +24,9 @@ class _Groups:
         self._above: dict[str, str] = {}
         for card in cards:
             if card.head[0] in SOURCES and len(ends := _ends(card)) == 2:
-                self._above[self.of(ends[0])] = self.of(ends[1])
+                self._above[self.representative(ends[0])] = self.representative(ends[1])
 
-    def of(self, node: str) -> str:
+    def representative(self, node: str) -> str:
         """The node that stands for a group."""
         while (above := self._above.get(node, node)) != node:
             self._above[node] = self._above.get(above, above)
@@ -39,7 +39,11 @@ def across_sources(cards: Iterable[Card]) -> frozenset[str]:
     cards = list(cards)
     groups = _Groups(cards)
     two = ((c.head, _ends(c)) for c in cards if c.head.startswith("c"))
-    return frozenset(head for head, ends in two if len(ends) == 2 and groups.of(ends[0]) == groups.of(ends[1]))
+    return frozenset(
+        head
+        for head, ends in two
+        if len(ends) == 2 and groups.representative(ends[0]) == groups.representative(ends[1])
+    )
 
 
 def held_nodes(initial: Mapping[str, tuple[float, Card]], cards: Iterable[Card]) -> tuple[dict[str, float], list[str]]:
@@ -49,7 +53,7 @@ def held_nodes(initial: Mapping[str, tuple[float, Card]], cards: Iterable[Card])
     """
     cards = list(cards)
     groups, held = _Groups(cards), dict[str, float]()
-    rest = {n: volt for n, (volt, _) in initial.items() if groups.of(n) != groups.of("0")}
+    rest = {n: volt for n, (volt, _) in initial.items() if groups.representative(n) != groups.representative("0")}
     for card in cards:
         ends = _ends(card) if card.head.startswith("c") else ()
         if len(ends) == 2 and "0" in ends:

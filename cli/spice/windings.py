@@ -14,7 +14,7 @@ Factors = dict[tuple[str, str], str]
 """Coupling factors by two coils."""
 
 
-def _said(card: Card, coils: Mapping[str, Card]) -> tuple[tuple[str, ...], str]:
+def _coils_and_factor(card: Card, coils: Mapping[str, Card]) -> tuple[tuple[str, ...], str]:
     """`K1 L1 L2 ... k`: coils and the factor of any two of them."""
     words = enough(card, 4)
     names, factor = words[1:-1], words[-1]
@@ -40,9 +40,10 @@ class Cores:
         self._core: dict[str, tuple[str, list[str], Factors]] = {}
         self.branches: dict[str, tuple[str, str]] = {}
         before, on = set[tuple[str, str]](), dict[str, list[str]]()
+        # coils that each card couples; two that are coupled twice are an error of the second
         for card in (c for c in cards if c.head.startswith("k")):
             try:
-                self._said[card.head] = _said(card, coils)
+                self._said[card.head] = _coils_and_factor(card, coils)
             except Unreadable:
                 continue  # told where the card is read
             twos = _twos(self._said[card.head][0])
@@ -52,6 +53,7 @@ class Cores:
             for coil in self._said[card.head][0]:
                 on.setdefault(coil, []).append(card.head)
         place = {head: k for k, head in enumerate(self._said)}
+        # cards that share a coil are one core
         for first in self._said:
             if first not in self._core:
                 self._gather(first, on, place)
@@ -71,10 +73,10 @@ class Cores:
         core[1].extend(found)
         self.branches |= {coil: (first, _branch(k, len(found))) for k, coil in enumerate(found)}
 
-    def of(self, card: Card) -> tuple[str, list[str], Factors]:
+    def core_of(self, card: Card) -> tuple[str, list[str], Factors]:
         """The first card of the core that a card tells of, its coils, their factors.  Unreadable."""
         if card.head not in self._said:
-            _said(card, self.coils)
+            _coils_and_factor(card, self.coils)
         if again := self._again.get(card.head):
             raise Unreadable(f"'{card.head}': {' and '.join(again)} are coupled already")
         return self._core[card.head]
@@ -84,9 +86,10 @@ def _branch(k: int, coils: int) -> str:
     return ("one", "two")[k] if coils == 2 else f"c{k + 1}"
 
 
-def coupled(card: Card, scope: Scope, cores: Cores) -> Element:
+def coupled_coils(card: Card, scope: Scope, cores: Cores) -> Element:
     """The coils of a core as one element, at the first of its cards."""
-    first, names, factors = cores.of(card)
+    first, names, factors = cores.core_of(card)
+    # the core stands at the first of its cards
     if first != card.head:
         return Element(())
     name, size = scope.name[card.head], len(names)
@@ -94,6 +97,7 @@ def coupled(card: Card, scope: Scope, cores: Cores) -> Element:
     if not all(abs(k) <= 1.0 for k in strength.values()):
         raise Unreadable(f"'{card.head}': a factor beyond 1")
     whole = any(abs(k) == 1.0 for k in strength.values())  # what two coils carry is one flux: no current is given
+    # two coils that are not perfectly coupled: a component of the library
     pair = size == 2 and not whole
     cards_of = [enough(cores.coils[w], 4) for w in names]
     given = [f"L{k} = {number_of(scope, words[3], 'H')}" for k, words in enumerate(cards_of, 1)]
@@ -101,14 +105,16 @@ def coupled(card: Card, scope: Scope, cores: Cores) -> Element:
     for (i, j), k in sorted((sorted(place[coil] for coil in two), k) for two, k in strength.items()):
         given.append(f"{'k' if pair else f'k{i}_{j}'} = {plain(k)}")
     ends, initial, currents, left = [], [], [], list[str]()
+    # each coil as a branch with its initial current
     for k, words in enumerate(cards_of):
         branch = _branch(k, size)
         ends.append(f"{branch} = {scope.node(words[1])} -> {scope.node(words[2])}")
         said = details(words[4:], scope, areas=False)
-        left += [*said.left(), *(n for n in ("m", "temp", "dtemp") if n in said.given)]
+        left += [*said.unread_words(), *(n for n in ("m", "temp", "dtemp") if n in said.given)]
         currents.append(said.number("ic", scope))
         at = f"f {'~' if whole else '='} {quantity(currents[-1], 'A')}" if scope.uic else "e = 0 V"
         initial.append(f"init {name}.{branch}.{at}")
+    # perfectly coupled: the flux is what is given
     if scope.uic and whole and size == 2:
         sizes = [value(words[3], scope.known) for words in cards_of]
         mutual = next(iter(strength.values())) * math.sqrt(math.prod(sizes))

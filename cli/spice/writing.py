@@ -46,7 +46,7 @@ LINE = 2000
 """Characters of a line that is written; one that the language reads may have five times as many."""
 
 
-def wrapped(text: str) -> str:
+def wrap_lines(text: str) -> str:
     """Longer lines broken behind commas and signs."""
     return "\n".join(_broken(line) if len(line) > LINE else line for line in text.split("\n"))
 
@@ -66,7 +66,7 @@ _RUN = re.compile(r"(?:^  (?:\w+: \w+\(\w+ = [\d.e+-]+ \w+\) \w+ -> \w+|init \w+
 """Statements whose layout is the formatter's already, if they are short: most of a large netlist."""
 
 
-def formatted(text: str) -> str:
+def format_fast(text: str) -> str:
     """The formatter's layout of a text; runs of plain statements go by it, which would take most of the time."""
     runs: list[str] = []
 

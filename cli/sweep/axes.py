@@ -55,7 +55,7 @@ class Axis:
         """It is a distribution."""
         return bool(self.quantile)
 
-    def at(self, u: Numbers) -> Numbers:
+    def values_at(self, u: Numbers) -> Numbers:
         """Values of a distribution at probabilities u."""
         return DISTRIBUTIONS[self.quantile](u, self.first, self.second)
 
@@ -80,10 +80,10 @@ def axis(text: str, evaluate: Evaluate) -> Axis:
         raise UsageError(f"--over {name}={said}: a distribution is written --over '{name}~{said}'")
     if ".." in said and not name.startswith("level "):
         return _grid(name, said, evaluate)
-    return listed(name, _parts(said), evaluate)
+    return list_axis(name, _parts(said), evaluate)
 
 
-def listed(name: str, texts: Sequence[str], evaluate: Evaluate) -> Axis:
+def list_axis(name: str, texts: Sequence[str], evaluate: Evaluate) -> Axis:
     """A list of expressions."""
     if not all(texts):
         raise UsageError(f"--over {name}: an empty value")
@@ -104,6 +104,7 @@ def _number(name: str, text: str, evaluate: Evaluate) -> float:
 
 
 def _grid(name: str, said: str, evaluate: Evaluate) -> Axis:
+    """Values of FIRST..LAST:NUMBER, linear or logarithmic."""
     ends, *more = said.split(":")
     first, last = (_number(name, text.strip(), evaluate) for text in ends.split("..", 1))
     spacing = more[1].strip() if len(more) > 1 else "linear"
@@ -119,6 +120,7 @@ def _grid(name: str, said: str, evaluate: Evaluate) -> Axis:
 
 
 def _distribution(name: str, said: str, evaluate: Evaluate) -> Axis:
+    """A distribution of two parameters; of lognormal the second is a factor."""
     found = _DRAWN.fullmatch(said)
     if found is None or found[1] not in DISTRIBUTIONS:
         raise UsageError(f"--over {name}~{said}: one of {', '.join(f'{d}(a, b)' for d in DISTRIBUTIONS)}")
@@ -128,6 +130,7 @@ def _distribution(name: str, said: str, evaluate: Evaluate) -> Axis:
     first = _number(name, texts[0], evaluate)
     factor = found[1] == "lognormal"
     second = _factor(name, texts[1]) if factor else _number(name, texts[1], evaluate)
+    # for which numbers there is none
     wrong = {
         "uniform": not second >= first,
         "loguniform": not (second >= first > 0.0),

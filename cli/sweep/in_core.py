@@ -22,7 +22,7 @@ ROWS = 256
 """Of a thinned trace at most."""
 
 
-def thinned(begin: float, step: float, time: Floats) -> tuple[Floats, NDArray[np.int64]]:
+def thin_instants(begin: float, step: float, time: Floats) -> tuple[Floats, NDArray[np.int64]]:
     """Every k-th instant of an interval, and for each the place among `time` of the last row before what follows it."""
     number = round((float(time[-1]) - begin) / step)
     grid = begin + step * np.arange(0, number + 1, -(-(number + 1) // ROWS))
@@ -47,14 +47,16 @@ class Cases:
             self._set_up(KEEPS[keep])
 
     def _set_up(self, keep: int) -> None:
+        """Prepare runs in the core: what varies, and which instants of traces are kept."""
         loaded, prepared, scene = self._loaded, self._prepared, self._prepared.network.scene
         self._core = InCore(loaded.request, loaded.target, prepared, lambda: loaded.run({}, Report()), keep)
         self._moving = self._core.moving(key if isinstance(key, str) else key[0] for key in self._keys)
         self.time, rows = np.zeros(0), np.zeros(0, dtype=np.int64)
+        # at the scene's interval, thinned
         if keep == TRACES and scene is not None and scene.every is not None and scene.start is not None:
             times, kinds = instants(self._core.options)
             evaluate = prepared.binding.evaluate
-            self.time, rows = thinned(evaluate(scene.start), evaluate(scene.every), times[(kinds & TRACE) > 0])
+            self.time, rows = thin_instants(evaluate(scene.start), evaluate(scene.every), times[(kinds & TRACE) > 0])
         self._core.set_up(rows)
         self._extrema = keep != END
 
@@ -62,9 +64,11 @@ class Cases:
         """What is kept of the cases, and the places of those that need a run of their own."""
         values = np.array([[case[name] for name in self._names] for case in cases], dtype=np.float64)
         with ex.fresh(self._compiled.nodes):
+            # numbers of all cases at once; those without are run one by one
             p, anchor, good = self._bound(values)
-        good &= self._loaded.allowed(self._keys, values)
+        good &= self._loaded.allowed_rows(self._keys, values)
         batch = self._core.batch
+        # cases that the core does not finish are run again by themselves
         found = batch.run(p[good], anchor[good])
         done = found.state == DONE
         place = np.flatnonzero(good)
@@ -99,7 +103,7 @@ class Cases:
         anchor = self._anchors(found.starts, len(values))
         good = found.good & np.isfinite(found.p).all(axis=1) & np.isfinite(anchor).all(axis=1)
         for k in {0, len(values) - 1}:  # what is evaluated together is what is bound alone
-            alone = self._alone(values[k]) if good[k] else None
+            alone = self._numbers_of_run(values[k]) if good[k] else None
             if alone is not None and not (np.array_equal(alone[0], found.p[k]) and np.array_equal(alone[1], anchor[k])):
                 return self._one_by_one(values)
             good[k] &= alone is not None
@@ -118,19 +122,19 @@ class Cases:
                     anchor[:, place] = column
         return anchor
 
-    def _alone(self, values: Floats) -> tuple[Floats, Floats] | None:
+    def _numbers_of_run(self, values: Floats) -> tuple[Floats, Floats] | None:
         """The numbers of one run by a binding of its own; None where it has another structure, or none."""
         try:
             binding = self._prepared.compiled.bind(dict(zip(self._keys, map(np.asarray, values), strict=True)))
         except ModelError:
             return None
-        return self._core.alone(binding, self._moving)
+        return self._core.numbers_of_run(binding, self._moving)
 
     def _one_by_one(self, values: Floats) -> tuple[Floats, Floats, NDArray[np.bool_]]:
         p = np.tile(self._prepared.binding.p, (len(values), 1))
         anchor, good = np.tile(self._core.guesses, (len(values), 1)), np.zeros(len(values), dtype=bool)
         for k, row in enumerate(values):
-            alone = self._alone(row)
+            alone = self._numbers_of_run(row)
             if alone is not None:
                 p[k], anchor[k] = alone
                 good[k] = True

@@ -38,7 +38,7 @@ class Journal:
             return
         text = self.path.read_bytes()
         whole = text[: text.rfind(b"\n") + 1]
-        with self._damaged():
+        with self._report_damage():
             lines = [json.loads(line) for line in whole.splitlines()]
             begun = json.dumps({"study": digest}).encode().startswith(text)  # the first line, or a part of it
             other = not begun and (lines[0].get("study") if lines else None) != digest
@@ -46,21 +46,21 @@ class Journal:
             raise UsageError(
                 f"{self.path} holds runs of another study, or of another text: remove it, or give -o another name"
             )
-        with self._damaged():
+        with self._report_damage():
             for line in lines[1:]:
                 self.done.take(Block.from_json(line["block"]) if "block" in line else Kept(**line))
         if whole != text:
             self.path.write_bytes(whole)
 
     @contextlib.contextmanager
-    def _damaged(self) -> Iterator[None]:
+    def _report_damage(self) -> Iterator[None]:
         try:
             yield
         except (ValueError, TypeError, KeyError, AttributeError, OverflowError) as error:
             raise TraceError(f"{self.path} is damaged: remove it, and the sweep begins anew ({error})") from error
 
     def _line(self, item: dict[str, object]) -> None:
-        with whole_files.named(self.path):
+        with whole_files.naming_file(self.path):
             self._file.write(json.dumps(item) + "\n")
             self._file.flush()
 
@@ -80,5 +80,5 @@ class Journal:
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
-        with contextlib.suppress(OSError) if error is not None else whole_files.named(self.path):
+        with contextlib.suppress(OSError) if error is not None else whole_files.naming_file(self.path):
             self._file.close()  # of a full disk what is left cannot be written now either

@@ -63,13 +63,13 @@ class Block:
     def one(self, k: int) -> Kept:
         """The k-th of them."""
 
-        def named(table: Floats) -> dict[str, Any] | None:
+        def named_values(table: Floats) -> dict[str, Any] | None:
             return dict(zip(self.names, table[k].tolist(), strict=True)) if table.shape[1] else None
 
         return Kept(
             int(self.runs[k]), 0, True, "", self.method, float(self.estimate[k]), int(self.steps[k]),
-            float(self.cpu_s[k]), named(self.end), named(self.least), named(self.most),
-            self.time.tolist() if self.time.size else None, named(self.traces) if self.time.size else None,
+            float(self.cpu_s[k]), named_values(self.end), named_values(self.least), named_values(self.most),
+            self.time.tolist() if self.time.size else None, named_values(self.traces) if self.time.size else None,
         )  # fmt: skip
 
     def to_json(self) -> dict[str, Any]:
@@ -77,25 +77,25 @@ class Block:
         found: dict[str, Any] = {}
         for item in fields(self):
             value = getattr(self, item.name)
-            found[item.name] = _packed(value) if isinstance(value, np.ndarray) else value
+            found[item.name] = _pack(value) if isinstance(value, np.ndarray) else value
         return found
 
     @classmethod
     def from_json(cls, line: dict[str, Any]) -> Block:
         """From a line of the journal."""
         found: dict[str, Any] = {
-            name: _unpacked(value) if isinstance(value, dict) else value for name, value in line.items()
+            name: _unpack(value) if isinstance(value, dict) else value for name, value in line.items()
         }
         found["names"] = tuple(found["names"])
         return cls(**found)
 
 
-def _packed(array: NDArray[Any]) -> dict[str, Any]:
+def _pack(array: NDArray[Any]) -> dict[str, Any]:
     data = base64.b64encode(np.ascontiguousarray(array).tobytes()).decode("ascii")
     return {"kind": array.dtype.str, "shape": list(array.shape), "data": data}
 
 
-def _unpacked(item: dict[str, Any]) -> NDArray[Any]:
+def _unpack(item: dict[str, Any]) -> NDArray[Any]:
     return np.frombuffer(base64.b64decode(item["data"]), dtype=item["kind"]).reshape(item["shape"]).copy()
 
 
@@ -143,10 +143,12 @@ class Done:
         """(name, values [number]) of end, least or most; NaN where there is none; nothing where nobody kept any."""
         for name in self.names():
             column, some = np.full(number, np.nan), False
+            # runs by themselves
             for run, kept in self.singles.items():
                 value = (getattr(kept, group) or {}).get(name)
                 some |= value is not None
                 column[run] = np.nan if value is None else value
+            # runs of the core, a table each
             for block in self.blocks:
                 table = getattr(block, group)
                 if table.shape[1] and name in block.names:

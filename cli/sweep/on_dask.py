@@ -81,22 +81,25 @@ class _Crew:
     def look(self) -> list[Kept]:
         """Takes note of workers that came and went; runs that have killed enough of them."""
         there, named = self.workers(), list[Kept]()
+        # workers that are gone: what they had is another's
         for address in [a for a in self.given if a not in there]:
             for item in self.given.pop(address).values():
                 if item.future.done() and item.future.status == "finished":
                     self.ready.put((None, item))  # its result came through
                     continue
                 self.client.cancel([item.future], force=True)
-                named += self._died(item.chunk)
+                named += self._handle_death(item.chunk)
+        # workers that came
         for address in there - set(self.given):
             self.given[address] = {}
         self.seen = self.looked if self.given else self.seen
         self.queue.jobs = max(1, len(self.given))
+        # nobody for a long time
         if self.looked - self.seen > ALONE:
             raise UsageError(f"no worker has been there for {ALONE:g} s: the same command goes on where it was")
         return named
 
-    def _died(self, chunk: Chunk) -> list[Kept]:
+    def _handle_death(self, chunk: Chunk) -> list[Kept]:
         """A chunk is begun again task by task, each by a worker that has nothing else; or its run is named."""
         if len(chunk.tasks) == 1:
             task = chunk.tasks[0]
@@ -145,25 +148,29 @@ class _Crew:
 
     def _took(self, key: str | None, item: _Given) -> Iterator[Item]:
         """The result of a chunk; one that was cancelled is another worker's by now."""
+        # an answer to what was given to another one since
         if key is not None and not any(items.pop(key, None) for items in self.given.values()):
             return
+        # fetched, unless its worker died meanwhile
         if item.future.status == "finished":
-            came = self._fetched(item)
+            came = self._fetch(item)
             if came is None:
                 self.client.cancel([item.future], force=True)
                 self.queue.again.extend(item.chunk.tasks)
                 return
             yield from self.queue.took(item.chunk, *came)
+        # with its worker
         elif item.future.status == "cancelled":
-            yield from self._died(item.chunk)
+            yield from self._handle_death(item.chunk)
+        # an error of the work itself is raised here
         else:
             error = item.future.exception()
             if type(error).__name__ != "KilledWorker":  # the scheduler's own count of deaths
                 raise error
-            yield from self._died(item.chunk)
+            yield from self._handle_death(item.chunk)
         item.future.release()
 
-    def _fetched(self, item: _Given) -> tuple[Answer, float] | None:
+    def _fetch(self, item: _Given) -> tuple[Answer, float] | None:
         """What a worker has ready; None where it died before that was fetched (Dask would wait for ever)."""
         while True:
             with suppress(TimeoutError):
@@ -184,6 +191,7 @@ def results(
         distributed: Any = importlib.import_module("distributed")
     except ImportError:
         raise UsageError("--dask needs Dask: pip install distributed") from None
+    # workers may run in other folders
     whole = replace(request, file=str(real(request.file)))
     try:
         client = distributed.Client(address, timeout=10)
@@ -193,6 +201,7 @@ def results(
         crew = _Crew(client, whole, keep, Queue(iter(tasks), number, 1), work)
         try:
             yield from crew.results()
+        # what is under way would go on without anybody
         finally:
             left = [item.future for items in crew.given.values() for item in items.values()]
             if left:

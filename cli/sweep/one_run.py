@@ -13,7 +13,7 @@ from sysdyn.cli.run.many.loaded import Loaded
 from sysdyn.cli.run.request.asked import Request
 from sysdyn.cli.run.running import Ran, finding
 from sysdyn.cli.sweep.axes import CHOICES
-from sysdyn.cli.sweep.in_core import Cases, thinned
+from sysdyn.cli.sweep.in_core import Cases, thin_instants
 from sysdyn.cli.sweep.kept import Item, Kept
 from sysdyn.cli.sweep.study import Case
 from sysdyn.dsl.text.diagnostics import ModelError, Report
@@ -39,7 +39,7 @@ class Runner:
         self._loaded: dict[tuple[tuple[str, str], ...], Loaded] = {} if loaded is None else {(): loaded}
         self._in_core: dict[Any, Cases | str] = {}
 
-    def loaded(self, choices: tuple[tuple[str, str], ...] = ()) -> Loaded:
+    def load_model(self, choices: tuple[tuple[str, str], ...] = ()) -> Loaded:
         """The model under choices that are no numbers."""
         if choices not in self._loaded:
             self._loaded[choices] = Loaded(_chosen(self.request, choices))
@@ -47,10 +47,10 @@ class Runner:
 
     def __call__(self, number: int, case: Case) -> Kept:
         """A run that cannot be made is kept with its reason."""
-        choices, settings = _parted(case)
+        choices, settings = _split_case(case)
         report = Report()
         try:
-            ran = self.loaded(choices).run(settings, report)
+            ran = self.load_model(choices).run(settings, report)
         except ModelError as error:
             return Kept(number, 1, False, _first(error.diagnostics), finding=finding(error.diagnostics))
         except UsageError as error:
@@ -59,13 +59,13 @@ class Runner:
             return Kept(number, 3, False, str(error))
         if ran is None:
             return Kept(number, 1, False, _first(report.diagnostics), finding=finding(report.diagnostics))
-        return _kept(number, ran, report, self.keep)
+        return _keep(number, ran, report, self.keep)
 
     def chunk(self, tasks: Sequence[Task]) -> tuple[list[Item], list[Task]]:
         """What is kept of the tasks that the core could run, and those that need a run of their own."""
         groups: dict[Any, list[Task]] = {}
         for number, case in tasks:
-            choices, settings = _parted(case)
+            choices, settings = _split_case(case)
             groups.setdefault((choices, tuple(settings)), []).append((number, case))
         found, left = list[Item](), list[Task]()
         for (choices, names), group in groups.items():
@@ -83,21 +83,21 @@ class Runner:
         key = choices, names
         if key not in self._in_core:
             try:
-                self._in_core[key] = Cases(self.loaded(choices), names, self.keep) if self.core else "not asked for"
+                self._in_core[key] = Cases(self.load_model(choices), names, self.keep) if self.core else "not asked for"
             except NotApplicableError as error:
                 self._in_core[key] = str(error)
             except (ModelError, UsageError, SolverFailure):
                 self._in_core[key] = "the text's own numbers do not run"
         return self._in_core[key]
 
-    def said(self, case: Case) -> str:
+    def reason_for_single_runs(self, case: Case) -> str:
         """Why cases like this one are run one by one; "" where they are not."""
-        choices, settings = _parted(case)
+        choices, settings = _split_case(case)
         way = self.way(choices, tuple(settings))
         return way if isinstance(way, str) else ""
 
 
-def _parted(case: Case) -> tuple[tuple[tuple[str, str], ...], dict[str, Any]]:
+def _split_case(case: Case) -> tuple[tuple[tuple[str, str], ...], dict[str, Any]]:
     """Choices of a case that are no numbers; its other settings."""
     choices = tuple((n, str(v)) for n, v in case.items() if n in CHOICES or n.startswith("level "))
     names = {name for name, _ in choices}
@@ -127,12 +127,13 @@ def _first(diagnostics: Any) -> str:
     return f"{errors[0].code}: {errors[0].message}" if errors else "it could not be run"
 
 
-def _kept(number: int, ran: Ran, report: Report, keep: str) -> Kept:
+def _keep(number: int, ran: Ran, report: Report, keep: str) -> Kept:
+    """What is kept of a run: how it ended, and end, extrema or traces of its quantities."""
     o = ran.outcome
     trace = o.traced
     values = {name: np.asarray(trace[name]) for name in trace.names}
     some = trace.time.size > 0
-    time, traces = _thinned(ran, trace, values) if some and keep == "traces" else (None, None)
+    time, traces = _thin_trace(ran, trace, values) if some and keep == "traces" else (None, None)
     extrema, within, none = some and keep != "end", o.extrema, (math.inf, -math.inf)
     return Kept(
         number,
@@ -152,7 +153,7 @@ def _kept(number: int, ran: Ran, report: Report, keep: str) -> Kept:
     )
 
 
-def _thinned(
+def _thin_trace(
     ran: Ran, trace: Trace, values: dict[str, Any]
 ) -> tuple[list[float] | None, dict[str, list[float]] | None]:
     """Rows at every k-th instant of the scene's interval, the last before each instant that has several."""
@@ -160,5 +161,5 @@ def _thinned(
     if scene is None or scene.every is None or scene.start is None:
         return None, None
     evaluate = ran.prepared.binding.evaluate
-    grid, place = thinned(evaluate(scene.start), evaluate(scene.every), trace.time)
+    grid, place = thin_instants(evaluate(scene.start), evaluate(scene.every), trace.time)
     return grid.tolist(), {name: v[place].tolist() for name, v in values.items()}

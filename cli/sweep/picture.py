@@ -26,6 +26,7 @@ def picture(found: Swept, kind: str) -> bytes:
     columns = len(over) + bands
     size = (2.4 + 3.1 * columns, 1.0 + 2.2 * max(len(names), 1))
 
+    # a row for each quantity: bands over time, then ends over each parameter
     def draw(figure: Any) -> None:
         axes = figure.subplots(max(len(names), 1), columns, squeeze=False, sharex="col")
         for row, name in enumerate(names):
@@ -33,9 +34,9 @@ def picture(found: Swept, kind: str) -> bytes:
                 _bands(axes[row, 0], found, kept, name)
             for k, varied in enumerate(over):
                 _scatter(axes[row, k + bands], found, kept, name, varied)
-            axes[row, 0].set_ylabel(_labelled(found, name))
+            axes[row, 0].set_ylabel(_label(found, name))
         for k, varied in enumerate(over):
-            axes[-1, k + bands].set_xlabel(_labelled(found, varied))
+            axes[-1, k + bands].set_xlabel(_label(found, varied))
         if bands:
             axes[-1, 0].set_xlabel("time, s")
         shown = ": all, 80 %, median" if len(found.cases) > FEW else ""
@@ -46,15 +47,17 @@ def picture(found: Swept, kind: str) -> bytes:
     return drawing(size, kind, draw)
 
 
-def _labelled(found: Swept, name: str) -> str:
+def _label(found: Swept, name: str) -> str:
     return ", ".join(filter(None, (name, found.unit(name))))
 
 
 def _bands(axis: Any, found: Swept, kept: Sequence[Kept], name: str) -> None:
+    """Curves of few runs, or quantiles of many, over time."""
     some = [k for k in kept if k.met and k.time and k.traces]
     if not some:
         return
     time = max((k.time or [] for k in some), key=len)
+    # runs that ended earlier have no place in a quantile
     whole = [k for k in some if k.time == time]
     table = np.array([k.traces[name] for k in whole if k.traces])
     if len(found.cases) <= FEW:

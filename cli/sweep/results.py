@@ -14,7 +14,7 @@ import numpy as np
 from sysdyn.cli import whole_files
 from sysdyn.cli.sweep.kept import Done
 from sysdyn.cli.sweep.study import Case
-from sysdyn.names import stored
+from sysdyn.names import trace_name
 
 
 def write(
@@ -35,17 +35,19 @@ def write(
         file.attrs["final"] = np.int64(len(done) == len(cases))
         run = file.create_dataset("run", data=np.arange(len(cases)), track_times=False)
         run.make_scale("run")
+        # columns over the runs
         for name, column, unit in _columns(cases, done, units, timings=timings):
-            data = file.create_dataset(name, data=_fixed(column), track_times=False)
+            data = file.create_dataset(name, data=_fixed_length(column), track_times=False)
             data.dims[0].attach_scale(run)
             if unit is not None:
                 data.attrs["units"] = unit
         _traces(file, run, len(cases), done, units)
+        # then written at once, beside its place
         file.flush()
         whole_files.write(path, file.id.get_file_image())
 
 
-def _fixed(column: Any) -> Any:
+def _fixed_length(column: Any) -> Any:
     """Texts as fixed-length UTF-8."""
     import h5py
 
@@ -64,7 +66,7 @@ def _columns(
         values = [case[name] for case in cases]
         plain = all(isinstance(v, float) for v in values)
         column = np.array(values, dtype=float if plain else object)
-        found.append((stored(f"set.{name}"), column, units.get(name)))
+        found.append((trace_name(f"set.{name}"), column, units.get(name)))
     number = len(cases)
     for group, label in (("end", "end"), ("least", "min"), ("most", "max")):
         found += [(f"{label}.{name}", column, units.get(name)) for name, column in done.columns(group, number)]
@@ -102,12 +104,14 @@ def _traces(file: Any, run: Any, number: int, done: Done, units: Mapping[str, st
     times = [np.array(r.time) for r in some] + [b.time for b in blocks]
     if not times:
         return
+    # instants of all runs are the same up to their end
     longest = max(times, key=len)
     time = file.create_dataset("time", data=longest, track_times=False)
     time.make_scale("time")
     time.attrs["units"] = "s"
     for name in done.names():
         table = np.full((number, len(longest)), np.nan)
+        # runs by themselves, then blocks of the core
         for r in some:
             assert r.time is not None
             assert r.traces is not None

@@ -48,7 +48,7 @@ class Study:
         """All cases, always in one order: the last list varies fastest, what is drawn fastest of all."""
         lists, drawn = [a for a in self.axes if not a.drawn], [a for a in self.axes if a.drawn]
         points = self._points(len(drawn))
-        columns = [axis.at(points[:, k]) for k, axis in enumerate(drawn)]
+        columns = [axis.values_at(points[:, k]) for k, axis in enumerate(drawn)]
         for chosen in itertools.product(*(a.values for a in lists)):
             fixed = {a.name: value for a, value in zip(lists, chosen, strict=True)}
             for k in range(max(self.runs, 1)):
@@ -86,6 +86,7 @@ def study(axes: list[Axis], sample: str | None, runs: int | None, seed: int) -> 
         raise UsageError(f"--over {twice} twice: one list, or a grid")
     if not axes:
         raise UsageError("nothing varies: --over NAME=VALUE,VALUE,..., or a study file")
+    # what is drawn needs a number of runs, and a number needs something drawn
     drawn = [axis.name for axis in axes if axis.drawn]
     if drawn and runs is None:
         raise UsageError(f"how many runs of {', '.join(drawn)}? --runs N")

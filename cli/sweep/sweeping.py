@@ -87,7 +87,8 @@ def axes_of(runner: Runner, texts: tuple[str, ...]) -> list[Axis]:
 
 
 def _evaluate(runner: Runner) -> Evaluate:
-    loaded = runner.loaded()
+    """Evaluate texts of axes in the units of the model's parameters."""
+    loaded = runner.load_model()
     known = {p.name: p.unit.dimension for p in loaded.first.prepared.network.parameters}
 
     def value(name: str, text: str) -> float | None:
@@ -122,12 +123,14 @@ def sweep(
     """
     runner = runner or Runner(request, keep)
     cases = tuple(study.cases())
-    _judged(runner, cases[0])
-    target = runner.loaded().target
+    _check_first(runner, cases[0])
+    target = runner.load_model().target
     texts = lock.hashes(target)
+    # a journal of other texts or settings does not count
     digest = study.digest(request=replace(request, output=None), texts=texts, version=__version__, keep=keep)
     units, attributes = _units(runner, cases[0]), _attributes(target, study)
     place = destination(output)
+    # one sweep at a time writes a file
     with claimed(place), Journal(place, digest) as journal:
         resumed = len(journal.done)
         tasks = ((k, case) for k, case in enumerate(cases) if k not in journal.done)
@@ -136,6 +139,7 @@ def sweep(
         first: tuple[float, int] | None = None
         cost = 0.0
         try:
+            # kept as they come
             for item in _items(request, tasks, left, min(jobs, max(left, 1)), keep, dask, runner):
                 journal.take(item)
                 now = time.monotonic()
@@ -144,14 +148,16 @@ def sweep(
                 more = number - first[1]
                 ahead = (now - first[0]) / more * (left - number) if more > FORETOLD else None
                 progress(len(journal.done) / len(cases), ahead)
+                # the file is written in between, seldom enough
                 if now - written > max(REFRESH, 10.0 * cost):
                     results.write(place, cases, journal.done, units, attributes, timings=timings)
                     written = time.monotonic()
                     cost = written - now
+        # whatever happened: what is there
         finally:
             results.write(place, cases, journal.done, units, attributes, timings=timings)
         journal.remove()
-    alone = runner.said(cases[0]) if journal.done.singles else ""
+    alone = runner.reason_for_single_runs(cases[0]) if journal.done.singles else ""
     return Swept(output, cases, journal.done, units, resumed, alone)
 
 
@@ -166,15 +172,15 @@ def _items(
     return spread(request, tasks, left, dask, keep)
 
 
-def _judged(runner: Runner, case: Case) -> None:
+def _check_first(runner: Runner, case: Case) -> None:
     """What is wrong with the text, or with instants that are asked for, stops a sweep before its first run."""
     try:
-        runner.loaded().bound({n: v for n, v in case.items() if n not in CHOICES and not n.startswith("level ")})
+        runner.load_model().bound({n: v for n, v in case.items() if n not in CHOICES and not n.startswith("level ")})
     except ModelError as error:  # numbers that the text refuses are a run's own failure
         if not {d.code for d in error.diagnostics} <= REFUSED:
             raise
     report = Report()
-    instants_of(runner.request, runner.loaded().target.document, report)
+    instants_of(runner.request, runner.load_model().target.document, report)
     report.raise_if_failed()
 
 
@@ -194,7 +200,7 @@ def _attributes(target: Target, study: Study) -> dict[str, Any]:
 
 def _units(runner: Runner, case: Case) -> dict[str, str]:
     """Of parameters, what varies of them and traced quantities by name."""
-    prepared = runner.loaded().first.prepared
+    prepared = runner.load_model().first.prepared
     known = {p.name: si_text(p.unit.dimension) for p in prepared.network.parameters}
     rows = [row for row in prepared.structure["rows"] if row.get("stored")]
     known |= {name: known[whole] for name in case if (whole := name.partition("[")[0]) in known}

@@ -84,7 +84,7 @@ class Queue:
             self.size = max(1, min(wanted, 4 * self.size, LARGEST))
         yield from answer[0]
 
-    def died(self, job: Chunk, how: str) -> Iterator[Kept]:
+    def handle_death(self, job: Chunk, how: str) -> Iterator[Kept]:
         """The runs that a worker died of go to others one by one, or one is named."""
         if not job.alone:
             self.again.extend(job.tasks)

@@ -3,6 +3,6 @@
 from __future__ import annotations
 
 
-def stored(name: str) -> str:
+def trace_name(name: str) -> str:
     """A name as a trace holds it: '/' in a quotient is U+2215 there, for a slash would make groups of HDF5."""
     return name.replace("/", "\u2215")

@@ -63,7 +63,7 @@ def _restore(self: Any, state: list[Any]) -> None:
         object.__setattr__(self, name, value)
 
 
-def _shown(names: tuple[str, ...]) -> Callable[[object], str]:
+def _make_repr(names: tuple[str, ...]) -> Callable[[object], str]:
     """Values as the names of their fields and what they hold."""
 
     def text(self: object) -> str:
@@ -79,17 +79,17 @@ FROZEN = {
 }  # fmt: skip
 
 
-def _compared(names: tuple[str, ...], *, frozen: bool) -> dict[str, Callable[..., Any] | None]:
+def _make_comparison(names: tuple[str, ...], *, frozen: bool) -> dict[str, Callable[..., Any] | None]:
     """Values of one class are equal where their fields are; what may change has no hash."""
     held = attrgetter(*names)
 
     def equal(self: object, other: object) -> Any:
         return held(self) == held(other) if other.__class__ is self.__class__ else NotImplemented
 
-    def hashed(self: object) -> int:
+    def hash_value(self: object) -> int:
         return hash(held(self))
 
-    return {"__eq__": equal, "__hash__": hashed if frozen else None}
+    return {"__eq__": equal, "__hash__": hash_value if frozen else None}
 
 
 def _plain(cls: type, options: dict[str, bool]) -> bool:
@@ -132,7 +132,7 @@ class _Fields:
         return found
 
 
-def _made(cls: type, *, slots: bool, frozen: bool = False, eq: bool = True, repr: bool = True) -> Any:
+def _make_class(cls: type, *, slots: bool, frozen: bool = False, eq: bool = True, repr: bool = True) -> Any:
     """The class anew, with slots and methods; what it writes itself stays."""
     own = {name: value for name, value in vars(cls).items() if name not in ("__dict__", "__weakref__")}
     kinds = cls.__annotations__
@@ -144,8 +144,8 @@ def _made(cls: type, *, slots: bool, frozen: bool = False, eq: bool = True, repr
     compared, shown = (
         tuple(n for n in names if n not in said or getattr(said[n], what)) for what in ("compare", "repr")
     )
-    equality = _compared(compared, frozen=frozen) if eq else {}
-    own = SHARED | (FROZEN if frozen else {}) | ({"__repr__": _shown(shown)} if repr else {}) | equality | own
+    equality = _make_comparison(compared, frozen=frozen) if eq else {}
+    own = SHARED | (FROZEN if frozen else {}) | ({"__repr__": _make_repr(shown)} if repr else {}) | equality | own
     own |= {"__slots__": names, "__match_args__": names}
     own["__dataclass_params__"] = _Standard.__dataclass_params__ if frozen else _CHANGING  # type: ignore[attr-defined]
     own["__dataclass_fields__"] = _Fields(kinds, defaults)
@@ -185,7 +185,7 @@ else:
 
         def wrap(cls: type) -> Any:
             if _plain(cls, options):
-                return _made(cls, **options)
+                return _make_class(cls, **options)
             return dataclasses.dataclass(**options)(cls)
 
         return wrap if cls is None else wrap(cls)

@@ -37,6 +37,7 @@ def error_of(
         return 0.0
     shift = _shift(test, reference, until)
     instants = at
+    # events: instants near them are left out, and their own shift counts
     if shift is not None:
         events = np.array([e.time for trace in (test, reference) for e in trace.events])
         instants = np.intersect1d(test.time, reference.time)
@@ -44,10 +45,12 @@ def error_of(
         instants = instants[near > max(shift, TIMING * (until - reference.time[0]))]
         if instants.size < 2 or instants[1] > until:
             return float("inf")
+    # both at the same instants, or with curves between them
     sources = [_source(trace, reference, judged, accuracy, until, instants) for trace in (reference, test)]
     span = float(sources[0].time[-1] - sources[0].time[0])
     tau = min(TIMING, SHARE * accuracy) * span
     verdict = compare(sources[0], sources[1], Tolerance(rtol=accuracy, tau=tau))
+    # a quantity or a part of the span is missing
     if len(verdict.quantities) < len(judged) or any(c.status == "coverage" for c in verdict.traces):
         return float("inf")
     return max((shift or 0.0) / span, max(c.worst.ratio for c in verdict.quantities) * accuracy)

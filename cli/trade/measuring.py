@@ -106,12 +106,14 @@ class Bench:
         """
         asked = self.request.formulation
         own = Carrying(asked, _text(self.request.levels), self.request.levels)
+        # the scene's own formulation and levels
         first = self._carry(own, self.report)
         if first is None:
             return False
         unknowns, detail = self._unknowns(first), self._detail(first)
         self.names, self.full = [first[0]], first[1]
         self.levels = _levels(self.carried[first].prepared.network, self.request.levels, first[1])
+        # others where the model is small enough, and none was named
         for name in TRIED if asked in (None, "auto") else []:
             if name == first[0]:
                 continue
@@ -120,6 +122,7 @@ class Bench:
                 self.refusals.append(Refusal(name, f"{why}; --formulation {name}"))
             elif self._carry(Carrying(name, first[1], self.levels[first[1]]), Report()):
                 self.names.append(name)
+        # other levels; the one of the most detail is the full model
         for text, levels in self.levels.items():
             key = self._carry(Carrying(first[0], text, levels), Report()) if text != first[1] else None
             if key is not None and self._detail(key) > detail:
@@ -175,7 +178,7 @@ class Bench:
         """Asked of the judged quantities."""
         return min([self.options.accuracy or ACCURACY, *(wanted for _, wanted in self.options.accuracy_on)])
 
-    def judged(self, trace: Trace) -> tuple[str, ...]:
+    def judged_quantities(self, trace: Trace) -> tuple[str, ...]:
         """Quantities whose errors count."""
         on = [name for name, _ in self.options.accuracy_on]
         return tuple(name for name in trace.names if not on or self.options.accuracy is not None or name in on)
@@ -186,6 +189,7 @@ class Bench:
         for formulation, level in itertools.product(self.names, self.levels):
             carried = self.carried.get((formulation, level)) or self.carried[formulation, own]
             seen = set()
+            # forms that are one for this model are tried once
             for index in INDICES:
                 form = choose_index(index, carried.started.facts)[0]
                 if form in seen or (self.request.index not in (None, "auto", index)):
@@ -223,7 +227,9 @@ class Bench:
         carried, report = self.carry(combination), Report()
         if carried is None:
             return None, f"{combination.formulation} cannot express {combination.level}", None
+        # the smaller of both limits
         most = [n for n in (carried.options.max_steps, limits.steps) if n is not None]
+        # the tolerance of the solver itself: no estimate, no second run
         options = replace(
             carried.options,
             output=None if name is None else self.folder / f"{name}.h5",
@@ -235,11 +241,13 @@ class Bench:
             max_steps=min(most, default=None),
             max_wall=limits.wall,
         )
+        # rows where the reference has them
         if at is not None:
             options = replace(options, at=tuple(at.tolist()), every=options.t_end - options.t_start)
         try:
             started = begin(carried.prepared, options, report) if carried.again else carried.started
             ran = run_from(self.target, carried.prepared, started, options, report) if started else None
+        # a setting that does not exist or fails is no end of the trade
         except UsageError as error:
             return None, error.format_message(), None
         except SolverFailure as failure:
@@ -254,6 +262,7 @@ class Bench:
     ) -> Measured | str:
         """One run, compared with the reference; a sentence where there is no such setting."""
         carried = self.carry(combination)
+        # rows at the reference's instants, thinned
         at = None if carried is None or carried.options.every is not None else some(reference.time, ROWS)
         ran, reason, said = self.trace(combination, tolerance, limits, at=at)
         if ran is None:
@@ -261,22 +270,24 @@ class Bench:
         outcome = ran.outcome
         found = outcome.traced
         error = None
+        # an error needs a run to the end
         if outcome.final:
-            error = error_of(found, reference, self.judged(reference), self.accuracy, until, at=at)
+            error = error_of(found, reference, self.judged_quantities(reference), self.accuracy, until, at=at)
             if not math.isfinite(error):
                 numbers = all(np.isfinite(found[name].values).all() for name in found.names)
                 lack = "apart from events it has no instants to compare" if numbers else "a quantity is no number"
                 reason = reason or lack
+        # work that was counted does not depend on the machine's load
         counts = {key: n for key, n in outcome.statistics.items() if isinstance(n, int)}
         size, method = self.size(combination), combination.method
-        fixed = work.fixed(found.time.size, size, method)
+        fixed = work.work_of_rows(found.time.size, size, method)
         return Measured(
             combination,
             tolerance,
             error,
             outcome.timings["cpu_integrate_s"],
             outcome.statistics["steps"],
-            fixed + work.counted(counts, size, method),
+            fixed + work.work_of_steps(counts, size, method),
             fixed,
             float(np.max(np.abs(found["audit.energy"].values), initial=0.0)),
             float(np.max(found["audit.constraints"].values, initial=0.0)),
@@ -351,7 +362,7 @@ def bench_of(request: Request, folder: Path) -> Bench:
     if key not in _benches:
         report, own = Report(), folder / f"ahead-{os.getpid()}"
         own.mkdir(exist_ok=True)
-        target = targets.asked(request, report)
+        target = targets.target_of(request, report)
         assert target is not None
         _benches[key] = Bench(request, target, report, own, time.monotonic())
         _benches[key].prepare()

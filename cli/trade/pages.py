@@ -49,6 +49,7 @@ def picture(found: Traded, kind: str) -> bytes:
     """PNG or SVG; one trade always the same bytes but for what was measured in seconds (nothing of it is drawn)."""
     colour = colours(found)
 
+    # a curve for each combination, work over error
     def draw(figure: Any) -> None:
         axis = figure.subplots()
         for c, line in curves(found).items():
@@ -69,13 +70,13 @@ def picture(found: Traded, kind: str) -> bytes:
         axis.set_xlabel("largest relative error of the traced quantities")
         axis.set_ylabel("work, ns of one machine")
         axis.set_title(found.name, fontweight="bold", fontsize=11, pad=10)
-        axis.set_title(_resolved(found), loc="right", fontsize=8.5, color="#7b828c", pad=10)
+        axis.set_title(_uncertainty_text(found), loc="right", fontsize=8.5, color="#7b828c", pad=10)
         _legend(axis, found, colour)
 
     return drawing((8.6, 5.0), kind, draw)
 
 
-def _resolved(found: Traded) -> str:
+def _uncertainty_text(found: Traded) -> str:
     return f"reference known to {found.reference.uncertainty:.0e}"
 
 
@@ -107,6 +108,7 @@ def _pareto(axis: Any, found: Traded) -> None:
 
 
 def _legend(axis: Any, found: Traded, colour: dict[str, str]) -> None:
+    """What colours, strokes and marks mean."""
     from matplotlib.lines import Line2D
 
     drawn = list(curves(found))
@@ -187,6 +189,7 @@ def _figure(found: Traded) -> str:
     """The data of plots.js: logarithms, so that its straight axes do."""
     arrays: list[str] = []
 
+    # numbers as base64 of doubles
     def add(values: Sequence[float]) -> int:
         raw = np.ascontiguousarray(np.log10(np.asarray(values)), dtype="<f8").tobytes()
         arrays.append(base64.b64encode(raw).decode("ascii"))
@@ -200,8 +203,10 @@ def _figure(found: Traded) -> str:
     drawn = [entry(c.name, line, colour=colour[c.formulation], marks=True) for c, line in curves(found).items()]
     stairs = list(reversed(found.pareto))
     drawn.append(entry("Pareto set", stairs, colour="currentColor", marks=True))
+    # a ring around the choice
     if found.chosen is not None:
         drawn.append(entry("chosen", [found.chosen], colour="currentColor", dots=9))
+    # the span holds all errors and the accuracy
     errors = [math.log10(_error(m)) for m in found.measured if m.usable] or [0.0]
     low, high = min(*errors, math.log10(found.accuracy)), max(*errors, math.log10(found.accuracy))
     panel = {"name": "work", "unit": "", "label": "work over error", "height": 440, "curves": drawn}

@@ -66,32 +66,39 @@ def reference(bench: Bench, budget: float | None, jobs: int | None = 1) -> tuple
     best: tuple[float, _Run, _Run] | None = None
     sure = SURE * bench.accuracy
     ways = list(_ways(bench))
-    with closing(Beside(_beside, (bench.request, bench.folder, ways[1], budget), jobs)) as beside:
+    with closing(Beside(_run_finest, (bench.request, bench.folder, ways[1], budget), jobs)) as beside:
+        # ways to run the scene, as unlike as there are
         for number, combination in enumerate(ways):
             made = beside.answer() if number == 1 else None
             run, said = made or _finest(bench, combination, budget, len(runs))
             reasons += said
             if run is None:
                 continue
+            # the nearest pair of runs that stepped differently
             for other in runs:
-                apart = error_of(run.trace, other.trace, bench.judged(other.trace), bench.accuracy, bench.options.t_end)
+                apart = error_of(
+                    run.trace, other.trace, bench.judged_quantities(other.trace), bench.accuracy, bench.options.t_end
+                )
                 if run.steps != other.steps and (best is None or apart < best[0]):  # equal steps are no second opinion
                     best = apart, other, run
             runs.append(run)
+            # near enough, or tried enough
             if best is not None and (best[0] <= sure or len(runs) == 3):
                 break
+    # no two runs to be compared
     if best is None:
         said = "; ".join(dict.fromkeys(text for text, _ in reasons))
         finding = next((found for _, found in reasons if found), None)
         raise NoReference(said or "there is but one way to run this scene", finding)
     uncertainty, first, second = best
     until = bench.options.t_end
+    # apart somewhere: up to there they agree
     if uncertainty > sure:
-        until, _ = horizon(first.trace, second.trace, dict.fromkeys(bench.judged(first.trace), sure))
+        until, _ = horizon(first.trace, second.trace, dict.fromkeys(bench.judged_quantities(first.trace), sure))
         if not until > bench.options.t_start:
             text = f"{first.name} and {second.name} at their finest are {uncertainty:.1e} apart"
             raise NoReference(f"{text}: too much for an accuracy of {bench.accuracy:.0e}")
-        judged = bench.judged(first.trace)
+        judged = bench.judged_quantities(first.trace)
         uncertainty = error_of(second.trace, first.trace, judged, bench.accuracy, until)
     return first.trace, Reference(first.name, second.name, uncertainty, until)
 
@@ -107,7 +114,7 @@ def _ways(bench: Bench) -> Iterator[Combination]:
         yield Combination(names[0], "2", "radau", level)
 
 
-def _beside(asked: tuple[Request, Path, Combination, float | None]) -> _Tried:
+def _run_finest(asked: tuple[Request, Path, Combination, float | None]) -> _Tried:
     """A run at the finest tolerance in a process of its own."""
     request, folder, combination, budget = asked
     return _finest(bench_of(request, folder), combination, budget, 1)

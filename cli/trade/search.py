@@ -88,12 +88,14 @@ class Search:
         self.climbs = [Climb(c) for c in combinations]
         for number, climb in enumerate(self.climbs):
             failed = 0
+            # from loose to tight
             for k in range(LOOSEST, TIGHTEST + 1):
                 if self._late():
                     return
                 self._run(climb, k, math.inf)
                 if climb.closed:
                     break
+                # several failures in a row
                 failed = failed + 1 if climb.runs[k].error is None else 0
                 if failed == TRIES:
                     climb.closed = climb.runs[k].reason
@@ -159,20 +161,24 @@ class Search:
     def _tighter(self, climb: Climb) -> int | None:
         """On to where the errors are foreseen to meet the accuracy."""
         last = max(climb.runs)
+        # nothing tighter
         if last == TIGHTEST:
             climb.closed = climb.runs[last].reason or "does not reach the accuracy"
             return None
         usable = [k for k in sorted(climb.runs) if climb.runs[k].usable]
+        # it failed there: twice tighter, or given up
         if not usable or usable[-1] != last:
             failed = [climb.runs[k].error is None or bool(climb.runs[k].reason) for k in sorted(climb.runs)[-TRIES:]]
             if all(failed) and len(failed) == TRIES:
                 climb.closed = climb.runs[last].reason
                 return None
             return min(last + 2, TIGHTEST)
+        # dearer than the best already, or foreseeably so
         if climb.runs[last].work >= self.best or self._foreseen(climb) > HOPE * self.best:
             error = climb.runs[last].error
             climb.closed = f"dominated: {climb.runs[last].work / self.best:.2g} of the best work at error {error:.1e}"
             return None
+        # errors that do not fall any more
         if len(usable) > 1 and last - usable[-2] >= FLAT[0]:
             one, two = (climb.runs[k].error or 0.0 for k in usable[-2:])
             if abs(one - two) <= FLAT[1] * two:
@@ -180,6 +186,7 @@ class Search:
                 if climb.combination.level:
                     self.flat[climb.combination.level] = two
                 return None
+        # by the observed power of the tolerance
         over = math.log10(max(self._over(climb.runs[last]), 1.0))
         step = math.ceil(2.0 * over / self._power(climb, usable)) if math.isfinite(over) else 2
         return min(last + min(max(step, 1), JUMP), TIGHTEST)

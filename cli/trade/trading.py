@@ -30,7 +30,7 @@ LEAST = 40
 """Steps that every run may take: the longest is a twentieth of the span."""
 
 
-def _allowed(request: Request) -> None:
+def _check_request(request: Request) -> None:
     """UsageError where what a trade chooses is said already."""
     check_tolerances(request)
     if request.rtol is not None or request.atol is not None:
@@ -55,15 +55,16 @@ def trade(
     full: every combination at every tolerance; budget [s] of wall time for all; jobs: processes that make runs ahead;
     None: where it pays, which it does not where the search leaves most combinations out.
     """
-    _allowed(request)
+    _check_request(request)
     began = time.monotonic()
-    target = targets.asked(request, report)
+    target = targets.target_of(request, report)
     if target is None:
         return None
-    request = targets.held(request, target)
+    request = targets.with_text(request, target)
     bench = Bench(request, target, report, folder, began)
     if not bench.prepare():
         return None
+    # what a trade that was stopped has measured
     journal = journal_of(request, target)
     kept, known = (journal.reference if journal else None) or reference(bench, budget, jobs)
     first = time.monotonic() - began
@@ -78,6 +79,7 @@ def trade(
     # runs that are made already: by a trade that was stopped, or side by side before the search asks for them
     made_before: Runs = dict(journal.runs) if journal else {}
     left = [c for c in combinations if full or (c, tolerance(FIRST)) not in made_before]
+    # runs ahead pay where all combinations are measured
     number = jobs or (company(first) if full else 1)
     if number > 1:
         asked = [Asked(request, folder, c, kept, known.until, full, wall()) for c in left]
@@ -86,6 +88,7 @@ def trade(
                 if made_before.setdefault((combination, at), found) is found and journal is not None:
                     journal.take(combination, at, found)
 
+    # from the journal, unless it was cut off by a limit that is wider here
     def measure(combination: Combination, tolerance: float, most: float) -> Measured | str:
         left = wall()
         step = work.step(bench.size(combination), combination.method)
@@ -97,6 +100,7 @@ def trade(
             journal.take(combination, tolerance, made)
         return made
 
+    # one of two orders: everything, or the cheapest first
     search = Search(bench.accuracy, known.uncertainty, measure, limit, progress)
     (search.full if full else search.thrifty)(combinations)
     if journal is not None and search.ended:
@@ -109,7 +113,7 @@ def trade(
         (*bench.refusals, *_never(search)),
         tuple((c.combination, c.closed) for c in search.climbs if c.closed not in ("", "measured", c.refused)),
         known,
-        bench.judged(kept),
+        bench.judged_quantities(kept),
         search.ended,
     )
 

@@ -51,7 +51,7 @@ among what was run of one model the least work cost 1.08 times the least CPU in 
 ten, 3.4 times of all."""
 
 
-def counted(statistics: Mapping[str, int], size: Size, method: str) -> float:
+def work_of_steps(statistics: Mapping[str, int], size: Size, method: str) -> float:
     """Work of the steps of one run.  statistics: as the trace holds them."""
     cost = COSTS[method]
     steps = statistics["steps"] + statistics["rejected_steps"]
@@ -66,7 +66,7 @@ def step(size: Size, method: str) -> float:
     return cost.step + cost.step_unknown * size.unknowns + cost.evaluation * size.entries
 
 
-def fixed(rows: int, size: Size, method: str) -> float:
+def work_of_rows(rows: int, size: Size, method: str) -> float:
     """Work of a run and the rows of its trace, whatever the tolerance."""
     cost = COSTS[method]
     return cost.run + rows * (cost.row + (cost.row_bent if size.bent else cost.row_entry) * size.entries)

@@ -38,7 +38,7 @@ class Gap:
 
 def gaps(one: Trace, other: Trace, bounds: Bounds, until: float) -> tuple[Gap, ...]:
     """The worst place of each quantity up to `until` [s], worst first; () where there is no common instant."""
-    (times, here, there), ratios = _compared(one, other, bounds)
+    (times, here, there), ratios = _ratios(one, other, bounds)
     inside = times <= until
     if not inside.any():
         return ()
@@ -53,7 +53,7 @@ def gaps(one: Trace, other: Trace, bounds: Bounds, until: float) -> tuple[Gap, .
 
 def horizon(one: Trace, other: Trace, bounds: Bounds) -> tuple[float, Gap | None]:
     """The last common instant [s] before any quantity differs, and what differs after it; -inf where there is none."""
-    (times, *_), ratios = _compared(one, other, bounds)
+    (times, *_), ratios = _ratios(one, other, bounds)
     apart = np.zeros(times.size, dtype=bool)
     for ratio in ratios.values():
         apart |= ratio > 1.0
@@ -73,7 +73,7 @@ def _common(one: Trace, other: Trace) -> tuple[Floats, Places, Places]:
     return times[use], here[use].astype(np.intp), there[use].astype(np.intp)
 
 
-def _compared(one: Trace, other: Trace, bounds: Bounds) -> tuple[tuple[Floats, Places, Places], dict[str, Floats]]:
+def _ratios(one: Trace, other: Trace, bounds: Bounds) -> tuple[tuple[Floats, Places, Places], dict[str, Floats]]:
     """Common instants and their places, and there the ratio of difference to bound of each quantity; not a number
     counts as infinite.
     """

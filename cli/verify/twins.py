@@ -11,7 +11,7 @@ from sysdyn.cli.run.prepare import Prepared, prepare
 from sysdyn.cli.run.start.starting import Started
 from sysdyn.dsl.model import expression as ex
 from sysdyn.dsl.text.diagnostics import Report
-from sysdyn.names import stored
+from sysdyn.names import trace_name
 from sysdyn.runtime.model.system import System
 from sysdyn.runtime.structure.redundancy import combination, dependent, reactions
 from sysdyn.values import dataclass
@@ -38,6 +38,7 @@ class Twins:
 
 def twins(prepared: Prepared, started: Started, until: float) -> Twins | None:
     """Residuals of both carriers between the start and `until` [s]; None where there is but one carrier."""
+    # the same rows by the other carrier
     other = prepare(
         prepared.network,
         Report(),
@@ -54,11 +55,13 @@ def twins(prepared: Prepared, started: Started, until: float) -> Twins | None:
     y, yd = started.state.for_form(system)
     random = np.random.default_rng(1)
     here, there = np.zeros((POINTS, system.rows)), np.zeros((POINTS, system.rows))
+    # around the start, at instants over the span
     for k in range(POINTS):
         t = started.state.t + (until - started.state.t) * k / POINTS
         point, rate = (x + 1e-2 * random.standard_normal(x.size) * np.where(x == 0.0, 0.1, x) for x in (y, yd))
         with np.errstate(all="ignore"):  # a point may lie outside the range of a root or logarithm
             here[k], there[k] = system.residual(t, point, rate), twin.residual(t, point, rate)
+    # no number in both is no difference
     apart = np.where(np.isfinite(here) | np.isfinite(there), np.abs(here - there), 0.0)
     size = np.max(np.abs(np.where(np.isfinite(here), here, 0.0)), axis=0, initial=0.0)
     ratio = np.max(np.where(np.isnan(apart), np.inf, apart), axis=0, initial=0.0) / np.where(size > 0.0, size, 1.0)
@@ -72,7 +75,7 @@ def free_quantities(prepared: Prepared, started: Started) -> tuple[str, ...]:
     free = free_multipliers(started)
     quantities = prepared.compiled.energies.quantities if free else ()
     found = [q.name for q in quantities if q.stored and any(n.data[0] in free for n in _multipliers(q.expression))]
-    return tuple(stored(name) for name in found)
+    return tuple(trace_name(name) for name in found)
 
 
 def _multipliers(expression: ex.Node) -> list[ex.Node]:

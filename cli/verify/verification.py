@@ -62,10 +62,10 @@ def verify(
     check_tolerances(request)
     if request.method == "euler":
         raise UsageError("--method euler: verify compares bdf and radau, or another and bdf; euler has no accuracy")
-    target = targets.asked(request, report)
+    target = targets.target_of(request, report)
     if target is None:
         return None
-    return _Verification(targets.held(request, target), target, report, folder, progress).all(jobs)
+    return _Verification(targets.with_text(request, target), target, report, folder, progress).all(jobs)
 
 
 @dataclass(frozen=True, slots=True)
@@ -87,7 +87,7 @@ def _part(asked: tuple[Request, Path | None, str | None]) -> _Part:
     """One formulation (None: the reference) in a process of its own."""
     request, folder, name = asked
     report = Report()
-    target = targets.asked(request, report)
+    target = targets.target_of(request, report)
     assert target is not None
     before = set(report)
     own = _Verification(request, target, report, folder, None)
@@ -132,17 +132,20 @@ class _Verification:
         """
         began = time.monotonic()
         asked: list[str | None] = []
+        # the reference first: its time tells whether processes pay
         if jobs is None or jobs == 1:
             self._formulation(None)
-            if self._stopped():
+            if self._has_stopped():
                 return None
             asked += [name for name in EVERY if name != self.runs[0].formulation]
+        # all side by side; which formulation is the reference's is known without a run
         else:
             with ex.fresh():
                 first = ready(self.request, self.target, Report())
             asked += [None, *(name for name in EVERY if first and name != first.formulation)]
         items = [(self.request, self.folder, name) for name in asked]
         try:
+            # in the order of formulations
             for name, part in zip(asked, each(_part, items, jobs, self._here, time.monotonic() - began), strict=True):
                 if isinstance(part, Lost):
                     raise RuntimeError(f"the process of {name or 'the reference'} died ({part.how})")
@@ -150,21 +153,23 @@ class _Verification:
                     self._take(part)
                     self.done = min(self.planned, self.done + len(METHODS) + (name is None))
                     self._advance(0.0, None)
-                if name is None and self._stopped():
+                # without a reference there is nothing to compare
+                if name is None and self._has_stopped():
                     return None
+        # what is there is compared, once there is a reference
         except KeyboardInterrupt:
             if self.finer is None:
                 raise
             self.interrupted = True
         self._tell()
         assert self.finer is not None
-        return self._compared(self.finer)
+        return self._compare_runs(self.finer)
 
     def _here(self, item: tuple[Request, Path | None, str | None]) -> None:
         """A formulation in this process."""
         self._formulation(item[2])
 
-    def _stopped(self) -> bool:
+    def _has_stopped(self) -> bool:
         """The reference did not come to its end: it is said why."""
         if self.runs and self.finer is not None:
             return False
@@ -197,7 +202,7 @@ class _Verification:
                 label = prepared.formulation
                 options = options_of(request, self.target, prepared, report, self.began, None)
                 if options is not None and not report.failed:
-                    self._methods(prepared, _gridded(options), report, reference=name is None)
+                    self._methods(prepared, _on_grid(options), report, reference=name is None)
             elif name is not None and (refusal := _refusal(name, report)):
                 self.refusals.append(refusal)
                 report = Report()
@@ -207,10 +212,12 @@ class _Verification:
             self.report.extend(d for d in report if d.severity != "error")
 
     def _methods(self, prepared: Prepared, options: Options, report: Report, *, reference: bool) -> None:
+        """Run a formulation by two methods; of the reference also its own run at a finer accuracy."""
         first, second = _pair(options)
         for method in (first, second):
             inner = Report()
             ran = self._run(prepared, options, method, inner, "")
+            # the method does not exist in this formulation: auto in its place
             if ran is None and not reference and method not in METHODS and any(d.code == "E607" for d in inner):
                 self._methods(prepared, replace(options, method="auto"), report, reference=False)
                 return  # this formulation has no such method
@@ -225,6 +232,7 @@ class _Verification:
             if method != first:
                 continue
             self._facts(ran, options.t_end)
+            # bounds of the comparison come from the reference
             if reference:
                 self.span = options.t_start, options.t_end
                 self.bounds = _bounds(options, self.runs[0].trace)
@@ -283,8 +291,10 @@ class _Verification:
 
     # --- comparison ---------------------------------------------------------------------------------------------
 
-    def _compared(self, finer: Run) -> Verified:
+    def _compare_runs(self, finer: Run) -> Verified:
+        """Compare all runs up to the horizon of the reference, or of a run that loses its accuracy earlier."""
         reference = self.runs[0]
+        # quantities without a bound, or missing somewhere, are named
         for name in reference.trace.names:
             if not math.isfinite(self.bounds.get(name, math.inf)):
                 self.left_out.setdefault(name, "no accuracy is asked of it")
@@ -335,7 +345,7 @@ class _Verification:
         with ex.fresh():
             prepared = ready(request, self.target, report)
             options = prepared and options_of(request, self.target, prepared, report, self.began, None)
-            other = self._other(prepared, _gridded(options), run) if prepared and options else None
+            other = self._other(prepared, _on_grid(options), run) if prepared and options else None
         return (math.inf, None) if other is None else horizon(run.trace, other.trace, bounds)
 
 
@@ -348,7 +358,7 @@ def _refusal(formulation: str, report: Report) -> Refusal | None:
     return Refusal(formulation, reasons[0].code, reasons[0].message) if reasons else None
 
 
-def _gridded(options: Options) -> Options:
+def _on_grid(options: Options) -> Options:
     """Options whose trace holds the same instants whatever the method."""
     if options.every is not None:
         return options

@@ -142,12 +142,14 @@ def disagreements(runs: Sequence[Run], bounds: Bounds, until: float) -> tuple[Di
     if not runs:
         return ()
     found, agreeing = [], []
+    # each against the reference
     for run in runs[1:]:
         gap = worst(runs[0], run, bounds, until)
         if gap is not None and gap.ratio > 1.0:
             found.append(Disagreement(runs[0], run, gap))
         if gap is None or gap.ratio <= 1.0 or runs[0].inaccurate:
             agreeing.append(run)
+    # then against each other
     for k, one in enumerate(agreeing):
         for other in agreeing[k + 1 :]:
             gap = worst(one, other, bounds, until)

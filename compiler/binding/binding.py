@@ -57,8 +57,8 @@ class Start:
         names = ("family", "positions", "values", "fixed", "label", "file", "line")
         return {name: getattr(self, name) for name in names}
 
-    def at(self, values: NDArray[np.float64]) -> Start:
-        """The same statement with other values."""
+    def with_values(self, values: NDArray[np.float64]) -> Start:
+        """The statement with other values."""
         return Start(self.family, self.positions, values, self.fixed, self.label, self.file, self.line, self.place)
 
 
@@ -91,17 +91,21 @@ def bind(
 ) -> Binding:
     """All numbers for one set of parameter values."""
     parameters = Parameters(network, overrides or {})
+    # what the form was built on holds for these numbers
     check_slopes(network, parameters)
     owners = _owners(form, parameters)
     _refuse_outside(model, owners, parameters, network.place)
     bind_covers(form.covers, owners, parameters)
+    # initial values before constants: these follow from them
     starts = _starts(form, owners, parameters)
     offsets = offsets_of(form, owners, starts, parameters)
     p, where = _layout(program, network, parameters, offsets)
+    # the values of parameters become views of p
     for name in (q.name for q in network.parameters if q.shape):  # what a large model has is held once
         values, at = parameters.values[name], where[name]
         parameters.values[name] = p[at : at + values.size].reshape(values.shape)
     ix = integers(program.slots, owners, parameters, where, network)
+    # integrated constraints: row, place and number of their constants
     rows = {(r.owner, r.block): k for k, r in enumerate(form.rows)}
     constants = tuple((rows[o.label, "phi"], where[o.name], offsets[o.name].size) for o in form.offsets)
     return Binding(
@@ -136,16 +140,20 @@ def _owners(form: DescriptorForm, parameters: Parameters) -> dict[str, Extents]:
 
 def _hull(name: str, places: tuple[tuple[tuple[Node, ...], Nest, Place], ...], parameters: Parameters) -> Extents:
     """The box around all rows of a label; a hole or a second row of one index is E805."""
+    # a label without indices: one row, `constraint c: ...`
     if not places[0][0]:
         if len(places) > 1:
             raise ModelError([Diagnostic("E805", f"constraint {name} is given twice", places[-1][2])])
         return ()
+    # the rows of every loop as places, one array an index
     found = [np.stack([np.rint(a) for a in over(nest, at, parameters.lookup)]) for at, nest, _ in places]
     everything = np.concatenate(found, axis=1).astype(np.int64)
+    # all loops are empty: `for i in 1..0`
     if everything.shape[1] == 0:
         return tuple((1, 0) for _ in places[0][0])
     box = tuple((int(row.min()), int(row.max())) for row in everything)
     counts = np.bincount(positions(box, list(everything)), minlength=int(np.prod([b - a + 1 for a, b in box])))
+    # each place of the box exactly once: 0 is a hole, 2 a second row
     wrong = int(np.argmax(counts != 1)) if np.any(counts != 1) else -1
     if wrong >= 0:
         at = np.unravel_index(wrong, [b - a + 1 for a, b in box])
@@ -160,7 +168,7 @@ def _starts(form: DescriptorForm, owners: dict[str, Extents], parameters: Parame
     found = []
     for pin in form.pins:
         family = form.families[pin.family]
-        *at, values = over(pin.nest, (*pin.at, pin.value), parameters.checked(pin.place))
+        *at, values = over(pin.nest, (*pin.at, pin.value), parameters.lookup_at_place(pin.place))
         box = owners[family.owner]
         where = _positions(family.owner, box, at, pin.place) if box else np.zeros(len(values), dtype=np.int32)
         parameters.finite(values, pin.place, f"the initial value of {family.name}")
@@ -186,6 +194,7 @@ def offsets_of(
 ) -> dict[str, NDArray[np.float64]]:
     """Constants of integrated constraints: B q0 at the initial displacements (0 where none is written)."""
     held: dict[tuple[str, str], NDArray[np.float64]] = {}
+    # initial displacements and momenta, as arrays over their families
     for k, family in enumerate(form.families):
         if family.kind in ("q", "p"):
             held[family.owner, family.kind] = np.zeros(extents(owners[family.owner]))
@@ -194,6 +203,7 @@ def offsets_of(
                     held[family.owner, family.kind].flat[start.positions] = start.values
     found: dict[str, NDArray[np.float64]] = {}
 
+    # the expressions of constants read these arrays
     def lookup(node: Node, args: list[Value]) -> Value:
         if node.op == "time":
             return parameters.start
@@ -203,6 +213,7 @@ def offsets_of(
             return held[node.data[:2]].flat[positions(box, whole) if box else 0]
         return parameters.lookup(node, args)
 
+    # a sum over the terms of each constraint, each over its loops
     for offset in form.offsets:
         box = owners[offset.label]
         total = found.setdefault(offset.name, np.zeros(int(np.prod(extents(box)))))
@@ -267,8 +278,10 @@ def _integer(
     kind, name = slot[0], slot[1]
     if kind == "value":
         return whole_number(parameters, name)
+    # where a family's array is by itself
     if kind in ("origin", "stride"):
         return _origin(owners[name]) if kind == "origin" else _strides(owners[name])[slot[2]]
+    # the same within the vector of all, a parameter's or a family's
     if kind in ("array", "step"):
         box = parameters.boxes[name] if name in parameters.boxes else owners[_label(name)]
         return where[name] + _origin(box) if kind == "array" else _strides(box)[slot[2]]

@@ -119,31 +119,39 @@ class _Judge:
     def _branch(
         self, b: Branch, law: Node, network: Network, controlled: list[tuple[str, Node, Place]]
     ) -> Iterator[Finding]:
+        """Findings on a branch by its kind; what controlled sources deliver is appended to `controlled`."""
         own = ex.var(b.name, "bf" if b.side == "e" else "be", *b.at)
         name = b.name.partition("#")[0]
+        # e f >= 0 on its own
         if b.kind == "dissipator":
-            yield self._signed(name, law, own, b.place)
+            yield self._judge_sign(name, law, own, b.place)
         elif b.kind in ("effort", "flow"):
             read = {n for n in ex.variables(law) if n.op == "var"}
+            # V(t): a port of the system
             if not read:
                 yield Finding(name, "port", "structure", "a source that follows time and parameters", b.place)
+            # e = -R f written as a source
             elif read == {own}:
-                yield self._signed(name, law, own, b.place)
+                yield self._judge_sign(name, law, own, b.place)
+            # e = k f2: judged together with the others
             else:
                 controlled.append((name, ex.mul(law, _conjugate(b, own)), b.place))
         elif b.kind in ("kinetic", "potential"):
-            yield from self._pumped(name, law, b.place)
+            yield from self._find_time_varying_store(name, law, b.place)
 
-    def _signed(self, name: str, law: Node, own: Node, place: Place) -> Finding:
+    def _judge_sign(self, name: str, law: Node, own: Node, place: Place) -> Finding:
         """A law and its own variable: e f >= 0?"""
+        # the sense of a dry friction stands in it: it opposes its own motion by its form
         if self._sliding(law):
             return Finding(name, "dissipates", "structure", "dry friction, against its own sliding", place)
-        fixed = cache(self._fixed)
+        fixed = cache(self._parameter_value)
+        # a proof: law(f) >= 0 over f >= 0 and <= 0 over f <= 0, as R f
         above, below = (enclose_over(law, {own: r}, fixed) for r in ((0.0, np.inf), (-np.inf, 0.0)))
         if above[0] >= 0.0 and below[1] <= 0.0:
             none = above[1] == 0.0 and below[0] == 0.0
             said = "no effort" if none else "e f >= 0 over all values"
             return Finding(name, "conserves" if none else "dissipates", "intervals", said, place)
+        # no proof, as a product of unknowns: look at points over the decades
         largest = 0.0
         others = sorted((n for n in ex.variables(law) if n is not own), key=lambda n: n.number)
         for x in DECADES:
@@ -154,7 +162,7 @@ class _Judge:
             largest = max(largest, abs(value)) if np.isfinite(value) else largest
         return Finding(name, "dissipates", "sampled", f"e f >= 0 at {len(DECADES)} points", place)
 
-    def _pumped(self, name: str, law: Node, place: Place) -> Iterator[Finding]:
+    def _find_time_varying_store(self, name: str, law: Node, place: Place) -> Iterator[Finding]:
         """A store whose law changes with time or signals is supplied through it."""
         moving = [n for n in ex.variables(law) if n.op == "time" or n.data[1] == "s"]
         if moving:
@@ -163,13 +171,16 @@ class _Judge:
     def _stores(self, network: Network) -> Iterator[Finding]:
         for energy in network.energies:
             if energy.function in ("T*", "T", "V", "V*"):
-                yield from self._pumped(f"energy of line {_line(energy.place)}", energy.expression, energy.place)
+                yield from self._find_time_varying_store(
+                    f"energy of line {_line(energy.place)}", energy.expression, energy.place
+                )
 
     def _contents(self, network: Network) -> Iterator[Finding]:
         """Contents D(f), G(e): the power is sum f dD/df; summand by summand where one variable moves it."""
         for energy in network.energies:
             if energy.function not in ("D", "G"):
                 continue
+            # D of flows, G of efforts; f too, which a displacement's rate is in a reflection
             kinds = ("f", "nf", "bf") if energy.function == "D" else ("e", "ne", "be", "f")
             own = sorted(
                 (n for n in ex.variables(energy.expression) if n.op == "var" and _is_rate(n, kinds)),
@@ -180,10 +191,13 @@ class _Judge:
             inner = ex.substitute(energy.expression, dict(rates))
             slopes = {n: derivative(inner, v) for n, v in rates.items()}
             still = ex.substitute(energy.expression, dict.fromkeys(own, ex.const(0.0)))
+            # friction against a moving belt: power comes in through the belt
             if own and not ex.is_const(still, 0.0) and self._sliding(energy.expression):
                 yield Finding(name, "port", "structure", "what it slides on moves", energy.place)
+            # one variable: the sign of its slope
             if len(own) == 1:
-                yield self._signed(name, slopes[own[0]], rates[own[0]], energy.place)
+                yield self._judge_sign(name, slopes[own[0]], rates[own[0]], energy.place)
+            # several: a quadratic form, or samples
             elif own:
                 yield self._quadratic(name, inner, list(rates.values()), energy.place)
 
@@ -192,19 +206,24 @@ class _Judge:
         slopes = [derivative(content, v) for v in own]
         second = [[derivative(s, v) for v in own] for s in slopes]
         still = dict.fromkeys(own, ex.const(0.0))
+        # the second derivatives are numbers, as those of f^T R f / 2: eigenvalues decide
         if not any(ex.variables(n) for row in second for n in row):
-            matrix = np.array([[self._fixed(n) for n in row] for row in second])
-            flat = all(self._fixed(ex.substitute(s, still)) == 0.0 for s in slopes)
+            matrix = np.array([[self._parameter_value(n) for n in row] for row in second])
+            flat = all(self._parameter_value(ex.substitute(s, still)) == 0.0 for s in slopes)
             values = np.linalg.eigvalsh((matrix + matrix.T) / 2.0)
             if flat and values[0] >= -1e-14 * abs(values).max():
                 role = "dissipates" if values[-1] > 0.0 else "conserves"
                 return Finding(name, role, "structure", "its matrix is positive semidefinite", place)
             if flat:
                 return Finding(name, "active", "structure", f"its matrix has the eigenvalue {values[0]:.3g}", place)
+        # of other contents the power at random points
         power = ex.add(*(ex.mul(v, s) for v, s in zip(own, slopes, strict=True)))
-        return self._sampled(name, [power], place)
+        return self._sample_power(name, [power], place)
 
     def _works(self, network: Network, controlled: list[tuple[str, Node, Place]]) -> Iterator[Finding]:
+        """Findings on works, each summand of an effort by what it reads; those of other unknowns are appended to
+        `controlled`.
+        """
         given = {u.name for u in network.unknowns}
         for work in network.works:
             name = f"work of line {_line(work.place)}"
@@ -216,10 +235,13 @@ class _Judge:
             for effort in summands(work.effort):
                 effort = _explicit(effort, network, given)
                 read = {n for n in ex.variables(effort) if n.op == "var"}
+                # -c sign(v)
                 if sliding := self._sliding(effort):
                     yield self._friction(name, effort, sliding, work.place)
+                # F(t)
                 elif not read:
                     yield Finding(name, "port", "structure", "it follows time and parameters", work.place)
+                # an implicit effort: its gamma says what it does
                 elif any(n.data[1] == "e" and n.data[0] in given for n in read):
                     yield self._implicit(name, effort, rate, network, work.place)
                 elif not read <= {work.on}:  # the effort of one displacement along itself has a potential
@@ -242,15 +264,18 @@ class _Judge:
         unknowns = [n for n in ex.variables(effort) if n.op == "var" and n.data[1] == "e"]
         flows = [n for n in ex.variables(rate) if n.op == "var"]
         closing = [c for c in network.constraints if c.kind == "gamma" and unknowns[0] in ex.variables(c.expression)]
+        # e in `gamma: e + R*f = 0`: solve for f, whose law in e has a sign
         if len(unknowns) == len(flows) == len(closing) == 1:
             gamma, own = closing[0].expression, unknowns[0]
             slope = derivative(gamma, flows[0])
             known = {n for n in ex.variables(gamma) if n.op == "var"} <= {own, flows[0]}
-            if known and not ex.variables(slope) and self._fixed(slope) != 0.0:
+            if known and not ex.variables(slope) and self._parameter_value(slope) != 0.0:
                 flow = ex.neg(ex.div(ex.substitute(gamma, {flows[0]: ex.const(0.0)}), slope))
                 part = derivative(effort, own)
                 if not ex.variables(part):
-                    return self._signed(name, ex.neg(ex.mul(ex.substitute(rate, {flows[0]: flow}), part)), own, place)
+                    return self._judge_sign(
+                        name, ex.neg(ex.mul(ex.substitute(rate, {flows[0]: flow}), part)), own, place
+                    )
         return Finding(name, "unknown", "structure", "an effort constraint gives its effort", place)
 
     def _constraints(self, network: Network) -> Iterator[Finding]:
@@ -262,7 +287,7 @@ class _Judge:
 
     def _together(self, controlled: Sequence[tuple[str, Node, Place]]) -> Finding:
         """Controlled sources and works by what they absorb together; the first that supplies most is named."""
-        found = self._sampled(
+        found = self._sample_power(
             ", ".join(dict.fromkeys(name for name, _, _ in controlled)),
             [power for _, power, _ in controlled],
             controlled[0][2],
@@ -272,7 +297,7 @@ class _Judge:
         worst = min(controlled, key=lambda item: self._least(item[1]))
         return Finding(worst[0], "active", found.how, f"controlled: {found.said}", worst[2])
 
-    def _sampled(self, name: str, powers: Sequence[Node], place: Place) -> Finding:
+    def _sample_power(self, name: str, powers: Sequence[Node], place: Place) -> Finding:
         """The sum of absorbed powers at random points."""
         leaves = sorted({n for p in powers for n in ex.variables(p)}, key=lambda n: n.number)
         lost = False
@@ -305,7 +330,7 @@ class _Judge:
             found = evaluate([root], lambda n, args: values[n] if n in values else self._leaf(n, args))[0]
             return float(np.ravel(found)[0])
 
-    def _fixed(self, root: Node) -> float:
+    def _parameter_value(self, root: Node) -> float:
         if root.op == "param" and not root.args:  # most of what a netlist asks
             return float(np.ravel(self._leaf(root, []))[0])
         return self._value(root, {})

@@ -8,7 +8,7 @@ from __future__ import annotations
 from collections import defaultdict
 from collections.abc import Iterator
 
-from sysdyn.compiler.forms.momenta import given, inertial, undefined
+from sysdyn.compiler.forms.momenta import coordinates_by_energy, inertial, undefined_momenta
 from sysdyn.compiler.model.energies import EnergyModel, tangible
 from sysdyn.compiler.model.integers import Integers
 from sysdyn.compiler.network.primal.bounds import Sizes
@@ -23,7 +23,7 @@ def check_energies(model: EnergyModel, network: Network) -> tuple[Diagnostic, ..
     return (
         *_idle_efforts(model),
         *_assertions(model, network),
-        *_undetermined(model, Sizes(network)),
+        *_find_undetermined(model, Sizes(network)),
         *_missing_momenta(model),
         *_indices(model),
     )
@@ -52,7 +52,7 @@ def _assertions(model: EnergyModel, network: Network) -> Iterator[Diagnostic]:
             yield Diagnostic("E513", message, c.place, "delete 'tangible'")
 
 
-def _undetermined(model: EnergyModel, sizes: Sizes) -> Iterator[Diagnostic]:
+def _find_undetermined(model: EnergyModel, sizes: Sizes) -> Iterator[Diagnostic]:
     """E516: no store, dissipator, constraint or law contains the coordinate, and there is one (no empty range)."""
     roots = [t.expression for name in model.functions for t in model.function(name)]
     roots += _of_rows(model, ("phi", "psi", "gamma")) + [w.effort for w in model.works]
@@ -70,9 +70,9 @@ def _undetermined(model: EnergyModel, sizes: Sizes) -> Iterator[Diagnostic]:
 
 def _missing_momenta(model: EnergyModel) -> Iterator[Diagnostic]:
     """E606: x.p is read, and no kinetic store moves with x."""
-    carriers = given(model) | inertial(model)
+    carriers = coordinates_by_energy(model) | inertial(model)
     for expression, place in _written(model):
-        for name in dict.fromkeys(undefined(model, carriers, expression)):
+        for name in dict.fromkeys(undefined_momenta(model, carriers, expression)):
             message = f"{name} has no momentum variable: T* has no second derivative in {name}'"
             yield Diagnostic("E606", message, place, "dT*/df is zero there")
 

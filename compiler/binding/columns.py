@@ -78,10 +78,10 @@ def following(network: Network, varied: set[str]) -> list[str]:
                 known.add(p.name)
                 found.append(p.name)
                 changed = True
-    return _ordered(network, found)
+    return _dependency_order(network, found)
 
 
-def _ordered(network: Network, names: list[str]) -> list[str]:
+def _dependency_order(network: Network, names: list[str]) -> list[str]:
     """Names after those that their formulas use."""
     formulas = {p.name: p.values for p in network.parameters}
     left, order = list(names), list[str]()
@@ -121,10 +121,12 @@ def columns(
 ) -> Columns | None:
     """The numbers of runs whose scalar parameters are `varied` [runs]; None where they need bindings of their own."""
     known = {p.name: p for p in network.parameters}
+    # constants of integrated rows need a binding each
     if form.offsets or not all(name in known for name in varied):
         return None
     names = [*varied, *following(network, set(varied))]
     moving = set(names)
+    # as in `again.way`: numbers alone may follow
     if any(known[n].shape or known[n].whole for n in names) or any(e.name in moving for e in network.elements):
         return None
     if moving & reads_of_structure(network, model, form, program, binding):
@@ -132,10 +134,12 @@ def columns(
     runs = len(next(iter(varied.values())))
     values = Varied(binding.parameters, {n: np.asarray(v, dtype=float) for n, v in varied.items()})
     good = np.ones(runs, dtype=bool)
+    # formulas, for all runs at once
     for name in names[len(varied) :]:
         found = _over(known[name].values[0], values, runs)
         good &= np.isfinite(found)
         values.values[name] = found
+    # runs in which a decision of the form fails are no good
     for slope in network.slopes:
         if not reads(slope.expression, moving):
             continue
@@ -146,6 +150,7 @@ def columns(
         if slope.sign:
             good &= slope.sign * found > 0.0
     starts: list[tuple[Start, Floats]] = []
+    # initial values by formulas, outside of arrays
     for pin, start in zip(form.pins, binding.initial, strict=True):
         if not reads(pin.value, moving):
             continue
@@ -154,6 +159,7 @@ def columns(
         found = _over(pin.value, values, runs)
         good &= np.isfinite(found)
         starts.append((start, found))
+    # one row of numbers a run
     p = np.tile(binding.p, (runs, 1))
     for place, name in enumerate(program.scalars):
         if name in moving:

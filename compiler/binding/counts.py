@@ -64,21 +64,25 @@ def _constraints(
         for k, r in enumerate(form.rows)
         if r.block in ("phi", "psi") and r.owner not in at_times
     }
+    # a matching of very many rows takes too long
     if sum(sizes.values()) > LARGEST:
         return []
     left = [(k, i) for k, size in sizes.items() for i in range(size)]
     owners = {f.owner: k for k, f in enumerate(form.families) if f.kind == "f"}
     pairs: dict[Element, list[Element]] = {}
+    # which coordinates each row reads
     for block, kind in (("phi", "q"), ("psi", "f")):  # a displacement and its flow are one coordinate
         families = {k: owners[f.owner] for k, f in enumerate(form.families) if f.kind == kind and f.owner in owners}
         pairs |= _pairs(program, binding, (block,), families)
+    # Hall's condition: a row that cannot be matched lies in an overdetermined block
     matched = match(left, pairs)
     alone = next((row for row in left if row not in matched), None)
     if alone is None:
         return []
-    rows, coordinates = _reached(alone, matched, pairs)
+    rows, coordinates = _overdetermined_block(alone, matched, pairs)
     of = sorted({form.families[k].owner for k, _ in coordinates})
     labels = sorted({form.rows[k].label for k, _ in rows})
+    # no coordinate at all: what it read cancels
     if not of:
         message = f"{', '.join(labels)} contains no coordinate: what it names is one, or is given, and cancels"
         return [Diagnostic("E511", message, form.rows[alone[0]].place, "delete it")]
@@ -109,6 +113,7 @@ def match(left: Sequence[Element], pairs: dict[Element, list[Element]]) -> dict[
     for root in left:
         before: dict[Element, Element] = {}
         stack, seen, end = [root], set(), None
+        # an alternating path from the root to a column without owner
         while stack and end is None:
             row = stack.pop()
             for column in pairs.get(row, ()):
@@ -120,6 +125,7 @@ def match(left: Sequence[Element], pairs: dict[Element, list[Element]]) -> dict[
                     end = column
                     break
                 stack.append(owner[column])
+        # along it each row takes the next column
         while end is not None:
             row = before[end]
             owner[end], previous = row, partner.get(row)
@@ -128,7 +134,7 @@ def match(left: Sequence[Element], pairs: dict[Element, list[Element]]) -> dict[
     return partner
 
 
-def _reached(
+def _overdetermined_block(
     root: Element, matched: dict[Element, Element], pairs: dict[Element, list[Element]]
 ) -> tuple[list[Element], list[Element]]:
     """Rows and columns on alternating paths from an unmatched row: the overdetermined block."""

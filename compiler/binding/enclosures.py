@@ -30,7 +30,7 @@ _RISING: Mapping[str, Callable[[Array], Array]] = {
 }  # fmt: skip
 
 
-def _ordered(*ends: Array) -> Bounds:
+def _hull(*ends: Array) -> Bounds:
     """The least and the largest of some values; no numbers are no bounds."""
     low = high = ends[0]
     for end in ends[1:]:
@@ -42,30 +42,33 @@ def _ordered(*ends: Array) -> Bounds:
 def _product(a: Bounds, b: Bounds) -> Bounds:
     with np.errstate(invalid="ignore"):
         ends = [np.where((x == 0.0) | (y == 0.0), 0.0, x * y) for x in a for y in b]
-    return _ordered(*ends)
+    return _hull(*ends)
 
 
 def _power(a: Bounds, exponent: float) -> Bounds:
+    """Bounds of x^exponent, a number: whole powers of either sign, others of what is not negative."""
     low, high = a
     around = (low <= 0.0) & (high >= 0.0)
     with np.errstate(all="ignore"):
         if exponent == round(exponent):
-            found = _ordered(low**exponent, high**exponent)
+            found = _hull(low**exponent, high**exponent)
+            # an even power of a range around zero is least at zero
             if exponent > 0:
                 least = np.where(around & (exponent % 2 == 0), 0.0, found[0])
                 return least, found[1]
+            # a pole within
             return np.where(around, -np.inf, found[0]), np.where(around, np.inf, found[1])
-        found = _ordered(np.maximum(low, 0.0) ** exponent, np.maximum(high, 0.0) ** exponent)
+        found = _hull(np.maximum(low, 0.0) ** exponent, np.maximum(high, 0.0) ** exponent)
     return found
 
 
-def _raised(a: Bounds, exponent: Bounds) -> Bounds:
+def _power_by_interval(a: Bounds, exponent: Bounds) -> Bounds:
     """Bounds of a power whose exponent is no number of the text: one number all the same, or a range."""
     every = np.concatenate([np.ravel(e) for e in exponent])
     if (every == every[0]).all():
         return _power(a, float(every[0]))
     with np.errstate(all="ignore"):
-        low, high = _ordered(*(np.power(np.maximum(x, 0.0), y) for x in a for y in exponent))
+        low, high = _hull(*(np.power(np.maximum(x, 0.0), y) for x in a for y in exponent))
     # a negative base has powers of either sign, at whole exponents alone
     return np.where(a[0] < 0.0, -np.inf, low), np.where(a[0] < 0.0, np.inf, high)
 
@@ -77,21 +80,25 @@ def _wave(a: Bounds, shift: float) -> Bounds:
     with np.errstate(invalid="ignore"):
         top = np.floor(high / turn) >= np.ceil(low / turn)
         bottom = np.floor((high - np.pi) / turn) >= np.ceil((low - np.pi) / turn)
-        found = _ordered(np.cos(low), np.cos(high))
+        found = _hull(np.cos(low), np.cos(high))
     return np.where(bottom, -1.0, found[0]), np.where(top, 1.0, found[1])
 
 
-def _called(name: str, args: list[Bounds]) -> Bounds:
+def _bounds_of_call(name: str, args: list[Bounds]) -> Bounds:
+    """Bounds of a function of the language over bounds of its arguments; unbounded where it is not known."""
     a = args[0]
+    # monotone: the ends
     if name in _RISING:
         with np.errstate(all="ignore"):
             found = _RISING[name]
-            return _ordered(found(a[0]), found(a[1]))
+            return _hull(found(a[0]), found(a[1]))
     if name in ("sin", "cos"):
         return _wave(a, 0.5 * np.pi if name == "sin" else 0.0)
+    # falling: the ends, exchanged
     if name == "acos":
         with np.errstate(all="ignore"):
-            return _ordered(np.arccos(a[0]), np.arccos(a[1]))
+            return _hull(np.arccos(a[0]), np.arccos(a[1]))
+    # even: least at zero where that lies within
     if name in ("abs", "cosh"):
         size = np.maximum(np.abs(a[0]), np.abs(a[1]))
         least = np.where((a[0] <= 0.0) & (a[1] >= 0.0), 0.0, np.minimum(np.abs(a[0]), np.abs(a[1])))
@@ -100,6 +107,7 @@ def _called(name: str, args: list[Bounds]) -> Bounds:
     if name in ("min", "max"):
         pick = np.minimum if name == "min" else np.maximum
         return pick(a[0], args[1][0]), pick(a[1], args[1][1])
+    # within one period the value moves with its argument, else anything below the period
     if name == "mod":
         b = args[1]
         with np.errstate(all="ignore"):
@@ -122,19 +130,22 @@ def _truth(node: Node, args: list[Bounds]) -> Bounds:
     if node.op in ("and", "or"):
         pick = np.minimum if node.op == "and" else np.maximum
         return pick.reduce([a[0] for a in args]), pick.reduce([a[1] for a in args])
+    # a relation: surely true where the intervals lie in order, surely false where in the other
     (low, high), (left, right) = args
     sure, never = {
         "<": (high < left, low >= right),
         "<=": (high <= left, low > right),
         ">": (low > right, high <= left),
         ">=": (low >= right, high < left),
+        # == is never sure, and != is its contrary
     }.get(node.data, (np.zeros_like(low, bool), (high < left) | (low > right)))
     if node.data == "!=":
         sure, never = never, sure
     return np.where(sure, 1.0, 0.0), np.where(never, 0.0, 1.0)
 
 
-def _combined(node: Node, args: list[Bounds], outlines: Mapping[str, Outline]) -> Bounds:
+def _bounds_of_node(node: Node, args: list[Bounds], outlines: Mapping[str, Outline]) -> Bounds:
+    """Bounds of a node by interval arithmetic; tables of one argument by their own outline."""
     match node.op:
         case "sum":
             low = high = np.full_like(args[0][0], node.data[0])
@@ -147,9 +158,10 @@ def _combined(node: Node, args: list[Bounds], outlines: Mapping[str, Outline]) -
                 found = _product(found, _power(bounds, e))
             return found
         case "pow":
-            return _raised(*args)
+            return _power_by_interval(*args)
         case "call":
-            return _called(node.data, args)
+            return _bounds_of_call(node.data, args)
+        # the branch that is sure, else the hull of both
         case "cond":
             (never, sure), then, other = args
             low = np.where(never == 1.0, then[0], np.where(sure == 0.0, other[0], np.minimum(then[0], other[0])))
@@ -166,6 +178,7 @@ def _combined(node: Node, args: list[Bounds], outlines: Mapping[str, Outline]) -
 def enclose(root: Node, low: Array, high: Array, fixed: Values, outlines: Mapping[str, Outline]) -> Bounds:
     """Bounds of `root`, which depends on time alone, over the intervals low..high [s] [k]."""
     order = order_of((root,))
+    # a number or a formula of parameters: a point
     if not variables(root):
         value = np.broadcast_to(np.asarray(fixed([root])[0], dtype=float), low.shape)
         return value, value
@@ -176,12 +189,13 @@ def enclose(root: Node, low: Array, high: Array, fixed: Values, outlines: Mappin
         if node in points:
             value = np.broadcast_to(np.asarray(points[node], dtype=float), low.shape)
             found[node] = value, value
+        # time is the interval itself; everything else from its arguments
         elif node.op == "time":
             found[node] = low, high
         else:
             with np.errstate(all="ignore"):
-                bounds = _combined(node, [found[a] for a in node.args if a in found], outlines)
-            found[node] = _ordered(*bounds)
+                bounds = _bounds_of_node(node, [found[a] for a in node.args if a in found], outlines)
+            found[node] = _hull(*bounds)
     return found[root]
 
 
@@ -208,12 +222,12 @@ def enclose_over(
 def _as_arrays(node: Node, args: Sequence[Range]) -> Range:
     """Bounds of one operation, by the arrays of one interval each."""
     with np.errstate(all="ignore"):
-        low, high = _ordered(*_combined(node, [(np.array([a]), np.array([b])) for a, b in args], {}))
+        low, high = _hull(*_bounds_of_node(node, [(np.array([a]), np.array([b])) for a, b in args], {}))
     return float(low[0]), float(high[0])
 
 
 def _single(node: Node, args: Sequence[Range]) -> Range | None:
-    """The same in plain numbers, where few operations do (most laws are such): arrays of one take ten times as long."""
+    """Bounds in plain numbers, where few operations do (most laws are such): arrays of one take ten times as long."""
     if node.op == "sum":
         low = high = node.data[0]
         for c, (a, b) in zip(node.data[1], args, strict=True):
@@ -222,11 +236,14 @@ def _single(node: Node, args: Sequence[Range]) -> Range | None:
     if node.op == "mul":
         found: Range | None = None
         for e, (low, high) in zip(node.data, args, strict=True):
+            # a factor
             if e == 1.0:
                 factor = _least_and_largest((low, high))
+            # a divisor: unbounded where zero lies within
             elif e == -1.0:
                 pole = low <= 0.0 <= high
                 factor = (-np.inf, np.inf) if pole else _least_and_largest((1.0 / low, 1.0 / high))
+            # other powers take the general way
             else:
                 return None
             if found is None:
@@ -245,7 +262,7 @@ _EXACT = {-np.inf: 0.0, 0.0: 1.0, np.inf: np.inf}
 
 
 def _least_and_largest(ends: Sequence[float]) -> Range:
-    """`_ordered` of numbers."""
+    """`_hull` of numbers."""
     if any(map(isnan, ends)):
         return -np.inf, np.inf
     return min(ends), max(ends)

@@ -71,7 +71,7 @@ def following(network: Network, form: DescriptorForm, program: Program, binding:
     """All that follows from the given parameters of a bound model."""
     owners, where = places_of(network, form, program, binding)
     where |= {name: k for k, name in enumerate(program.scalars)}
-    follows = {p.name: used for p in network.parameters if (used := _used(network, p))}
+    follows = {p.name: used for p in network.parameters if (used := _parameters_read(network, p))}
     pieces = [
         *_parameters(network, binding, where, follows),
         *_initial(form, binding),
@@ -88,7 +88,7 @@ def _names(roots: Sequence[Node]) -> tuple[str, ...]:
     return tuple(dict.fromkeys(n.data for n in topological(roots) if n.op == "param"))
 
 
-def _used(network: Network, parameter: Parameter) -> tuple[str, ...]:
+def _parameters_read(network: Network, parameter: Parameter) -> tuple[str, ...]:
     """The parameters that the text gives a parameter by; none for a number."""
     known = {p.name for p in network.parameters}
     roots = [*parameter.values, *(e.value for e in network.elements if e.name == parameter.name)]
@@ -138,6 +138,7 @@ def _values(network: Network, parameter: Parameter, binding: Binding, first: int
     """The formulas of one parameter: over its indices, or element by element; then its elements set apart."""
     box = binding.parameters.boxes.get(parameter.name, ())
     size = int(np.prod(extents(box)))
+    # one formula over loop variables, or one for each index that they leave open
     if parameter.indices:
         pairs = zip(parameter.indices, box, strict=False)
         nest = tuple(Loop(name, const(a), const(b)) for name, (a, b) in pairs)
@@ -145,10 +146,12 @@ def _values(network: Network, parameter: Parameter, binding: Binding, first: int
         for k, value in enumerate(parameter.values):
             every = np.arange(size) if len(parameter.values) == 1 else np.arange(k, size, rest)
             yield _Piece(Formula(block, nest, value), "parameter", number, every // max(rest, 1), first + every)
+    # no loop variables: one formula for all elements, or one each
     else:
         for k, value in enumerate(parameter.values):
             every = np.arange(size) if len(parameter.values) == 1 else np.array([k])
             yield _Piece(Formula(block, (), value), "parameter", 1, np.zeros_like(every), first + every)
+    # elements that a scene sets come last and win
     for setting in network.elements:
         if setting.name == parameter.name:
             at = [np.rint(binding.evaluate(node)).astype(np.int64).reshape(1) for node in setting.at]

@@ -70,8 +70,10 @@ def instants(
     """
     search = _Search(binding.parameters, t0, t1)
     try:
-        for watched in _watched(form, {t.name: t for t in tables}, read):
+        # jumps and kinks of what is integrated and of what events read
+        for watched in _watched_operations(form, {t.name: t for t in tables}, read):
             search.add(watched)
+        # events at instants: affine ones a step finds by itself
         for node in crossed:
             if _in_time_alone(node) and _degree((node,)) > 1:
                 search.add(_zeros(node, (node,)))
@@ -101,8 +103,8 @@ def changes(
     search = _Search(parameters, *span)
     try:
         for node in topological_unbound([root]):
-            for watched in _of(node, dict(tables)):
-                search.add(replace(watched, nest=_trimmed(watched.arguments, nest)))
+            for watched in _watches_of(node, dict(tables)):
+                search.add(replace(watched, nest=_trim_nest(watched.arguments, nest)))
         return search.times()
     except _TooManyError:
         return np.zeros(0)
@@ -122,7 +124,7 @@ def _zeros(node: Node, arguments: tuple[Node, ...]) -> Watched:
     return Watched(node, arguments, lambda v: np.sign(v[0]), np.zeros(1), ())
 
 
-def _watched(form: DescriptorForm, tables: dict[str, Table], read: Sequence[Node]) -> Iterator[Watched]:
+def _watched_operations(form: DescriptorForm, tables: dict[str, Table], read: Sequence[Node]) -> Iterator[Watched]:
     """Operations of all rows that are integrated, and of what events read, those inside others first."""
     stack: list[tuple[Node, Nest]] = [(node, ()) for node in read]
     for block in form.blocks:
@@ -132,20 +134,22 @@ def _watched(form: DescriptorForm, tables: dict[str, Table], read: Sequence[Node
     while stack:
         root, nest = stack.pop()
         for node in topological_unbound([root]):
+            # the body of a reduction under its own loop
             if node.op == "reduce":
                 first, last, body = node.args
                 stack.append((body, (*nest, Loop(node.data[1], first, last))))
-            for watched in _of(node, tables):
-                kept = _trimmed(watched.arguments, nest)
+            for watched in _watches_of(node, tables):
+                kept = _trim_nest(watched.arguments, nest)
                 if (node, kept) not in seen:
                     yield Watched(node, watched.arguments, watched.label, watched.levels, kept)
-            seen.add((node, _trimmed(node.args, nest)))
+            seen.add((node, _trim_nest(node.args, nest)))
 
 
-def _of(node: Node, tables: dict[str, Table]) -> Iterator[Watched]:
+def _watches_of(node: Node, tables: dict[str, Table]) -> Iterator[Watched]:
     """What is watched of a node; nothing where it does not depend on time alone."""
     if not any(_in_time_alone(a) for a in node.args):
         return
+    # kinks at breakpoints, in each argument that follows time
     if node.op == "table":
         table = tables.get(node.data[0])
         for argument, points in zip(node.args, table.points if table else (), strict=False):
@@ -156,13 +160,16 @@ def _of(node: Node, tables: dict[str, Table]) -> Iterator[Watched]:
         return
     if not all(_in_time_alone(a) or not variables(a) for a in node.args):
         return
+    # where two sides are equal
     if node.op == "cmp" or (node.op == "call" and node.data in ("min", "max")):
         yield Watched(node, node.args, lambda v: np.sign(v[0] - v[1]), np.zeros(1), ())
     elif node.op == "call" and node.data in ("step", "abs", "sign"):
         yield _zeros(node, node.args)
+    # at whole numbers
     elif node.op == "call" and node.data in ("floor", "ceil"):
         rounded = np.floor if node.data == "floor" else np.ceil
         yield Watched(node, node.args, lambda v: np.asarray(rounded(v[0])), None, ())
+    # at whole quotients
     elif node.op == "call" and node.data == "mod":
         yield Watched(node, node.args, lambda v: np.floor(v[0] / v[1]), None, ())
 
@@ -176,7 +183,7 @@ def _in_time_alone(node: Node) -> bool:
     return bool(found) and all(leaf.op == "time" for leaf in found)
 
 
-def _trimmed(arguments: tuple[Node, ...], nest: Nest) -> Nest:
+def _trim_nest(arguments: tuple[Node, ...], nest: Nest) -> Nest:
     """The loops whose variables the arguments use, and those that these loops' bounds use."""
     used = {n.data for n in topological(arguments) if n.op == "index"}
     kept: list[Loop] = []
@@ -193,6 +200,7 @@ def _degree(roots: tuple[Node, ...]) -> int:
     for node in topological(roots):
         inside = [found[a] for a in node.args]
         most = max(inside, default=0)
+        # t is 1; 2 + 3*t and p*t are still affine; t*t, t^2 and sin(t) are not
         if node.op == "time":
             found[node] = 1
         elif node.op == "sum" or most == 0:
@@ -235,20 +243,23 @@ class _Search:
         number = len(next(iter(columns.values()))) if columns else 1
         if number == 0:
             return
+        # arrays of very many elements
         if 2 * number > BUDGET:
             self.note = f"instants in the text of {number} elements are not searched for: they are integrated through"
             return
         labels = Labels(watched, columns, self._parameters.lookup)
         try:
-            brackets = self._affine(watched, labels, number) or self._sampled(watched, labels, number)
+            brackets = self._affine(watched, labels, number) or self._bracket_changes(watched, labels, number)
         except KeyError:  # a constant that is known at the start only
             return
+        # what jumps at the start itself is an instant there
         start = self.t0 + ROUND_OFF * (self.t1 - self.t0)
         found = labels.bisect(*brackets, start)
         near = found <= start  # the start lies on its own right side
         found = found[~near & (found <= self.t1)]
         if near.any() and labels.jumps(np.arange(number), self.t0, self.t0 + 1e-6 * (self.t1 - self.t0)):
             found = np.append(found, self.t0)
+        # one node may stand under several nests
         found = distinct(found)
         before = self._found.get(watched.node, found)
         self._found[watched.node] = distinct(before, found)
@@ -261,6 +272,7 @@ class _Search:
         if _degree(arguments[:1] if whole else arguments) > 1 or (whole and _degree(arguments[1:]) > 0):
             return None
         every = np.arange(number)
+        # linear in time: the values at both ends tell all crossings
         ends = [labels.measure(every, np.full(number, t), quotient=whole) for t in (self.t0, self.t1)]
         slope = (ends[1] - ends[0]) / (self.t1 - self.t0)
         low, high = np.minimum(*ends), np.maximum(*ends)
@@ -268,6 +280,7 @@ class _Search:
             return None
         which: list[Whole] = []
         level: list[Array] = []
+        # floor, ceil, mod: every whole number between
         if watched.levels is None:
             first, count = np.floor(low), np.maximum(np.ceil(high) - np.floor(low) + 1.0, 0.0)
             if count.sum() > 4 * MOST + 4 * number:
@@ -276,6 +289,7 @@ class _Search:
                 take = every[k < count]
                 which.append(take)
                 level.append(first[take] + k)
+        # given levels: breakpoints, zero
         else:
             for value in watched.levels:
                 take = every[(low <= value) & (value <= high)]
@@ -286,11 +300,12 @@ class _Search:
         index, at = index[moving], at[moving]
         if index.size > 4 * MOST + 4 * number:
             raise _TooManyError
+        # by division, then a bracket of some roundings around it
         t = self.t0 + (at - ends[0][index]) / slope[index]
         around = 1e-12 * np.maximum(max(abs(self.t0), abs(self.t1)), np.abs(t))
         return index, np.maximum(t - around, self.t0), np.minimum(t + around, self.t1)
 
-    def _sampled(self, watched: Watched, labels: Labels, number: int) -> tuple[Whole, Array, Array]:
+    def _bracket_changes(self, watched: Watched, labels: Labels, number: int) -> tuple[Whole, Array, Array]:
         """Brackets between neighbouring samples of different labels, on pieces smooth inside."""
         inside = [self._found[n] for n in topological(watched.arguments) if n in self._found]
         edges = distinct(np.array([self.t0, self.t1]), *inside)
@@ -305,7 +320,7 @@ class _Search:
             part = (np.arange(each) + random.uniform(0.1, 0.9, (left.size, each))) / each
             t = np.concatenate([left[:, None], left[:, None] + (right - left)[:, None] * part, right[:, None]], axis=1)
             pairs = np.repeat(np.arange(number), t.size), np.tile(t.ravel(), number)
-            value = labels.at(*pairs).reshape(number, *t.shape)
+            value = labels.labels_at(*pairs).reshape(number, *t.shape)
             k, piece, place = np.nonzero(value[..., 1:] != value[..., :-1])
             if k.size > 4 * MOST:
                 raise _TooManyError

@@ -117,7 +117,7 @@ class _Jumping:
     def what(self) -> str | None:
         """Where it jumps, in words; None where it does not."""
         for t in self._instants():
-            if self._apart(self._points(FEW), time(), *_around(t)):
+            if self._jumps_between(self._points(FEW), time(), *_adjacent_doubles(t)):
                 return f"at t = {t:.9g} s"
         for node in (n for n in topological_unbound([self.root]) if _steps(n, self.network)):
             moving = sorted((n for n in variables(node) if n.op == "var"), key=lambda n: n.number)
@@ -150,14 +150,17 @@ class _Jumping:
         points, label = self._points(POINTS), self._label(node)
         size = points[leaf].size
         which, line = np.repeat(np.arange(size), LINE.size), np.tile(LINE, size)
+        # each random point with the leaf moved along LINE: where the branch's label changes, an edge lies between
         labels = self._labels(label, points, which, leaf, line).reshape(size, LINE.size)
         point, place = np.nonzero(labels[:, 1:] != labels[:, :-1])
+        # more edges than need be looked at: a sample of them
         if point.size > EDGES * POINTS:
             take = np.sort(self._random.choice(point.size, EDGES * POINTS, replace=False))
             point, place = point[take], place[take]
         if not point.size:
             return False
         low, high, first = LINE[place], LINE[place + 1], labels[point, place]
+        # halve until low and high are adjacent doubles on the two sides
         for _ in range(_HALVINGS):
             middle = low + 0.5 * (high - low)
             inside = (middle > low) & (middle < high)
@@ -165,7 +168,7 @@ class _Jumping:
                 break
             same = self._labels(label, points, point, leaf, middle) == first
             low, high = np.where(inside & same, middle, low), np.where(inside & ~same, middle, high)
-        return self._apart({name: values[point] for name, values in points.items()}, leaf, low, high)
+        return self._jumps_between({name: values[point] for name, values in points.items()}, leaf, low, high)
 
     def _label(self, node: Node) -> tuple[tuple[Node, ...], Callable[..., Array]]:
         """The arguments of an operation, and what is constant on its branches."""
@@ -203,7 +206,7 @@ class _Jumping:
 
         return look
 
-    def _apart(self, points: Mapping[Node | str, Array], leaf: Node, *sides: Array | float) -> bool:
+    def _jumps_between(self, points: Mapping[Node | str, Array], leaf: Node, *sides: Array | float) -> bool:
         """Whether the expression differs at any points where one leaf has the values of two sides."""
         shape = points[leaf].shape
         looks = [self._look({**points, leaf: np.broadcast_to(side, shape)}) for side in sides]
@@ -213,6 +216,6 @@ class _Jumping:
             return bool((np.abs(found[0] - found[-1]) > MEETS * np.maximum(*sizes)).any())
 
 
-def _around(t: float) -> tuple[float, float]:
+def _adjacent_doubles(t: float) -> tuple[float, float]:
     """The doubles before and behind an instant."""
     return float(np.nextafter(t, -np.inf)), float(np.nextafter(t, np.inf))

@@ -65,7 +65,7 @@ class Labels:
         found = evaluate(nodes or self._watched.arguments, look)
         return [np.broadcast_to(np.asarray(v, dtype=float), t.shape) for v in found]
 
-    def at(self, index: Whole, t: Array) -> Array:
+    def labels_at(self, index: Whole, t: Array) -> Array:
         """Labels [k] in iterations index [k] at t [k]."""
         with np.errstate(all="ignore"):
             return np.nan_to_num(self._watched.label(self._values(index, t)))
@@ -92,11 +92,11 @@ class Labels:
         """The first double of the new label in each bracket; where a zero lies between, the last of it too.  Up to
         `early` any will do.
         """
-        start, end = self.at(index, low), self.at(index, high)
+        start, end = self.labels_at(index, low), self.labels_at(index, high)
         take = start != end
         index, low, high, start, end = index[take], low[take], high[take], start[take], end[take]
         first = self._flip(index, low, high, start, early)
-        middle = self.at(index, first)
+        middle = self.labels_at(index, first)
         again = middle != end
         last = self._flip(index[again], first[again], high[again], middle[again], early)
         # a zero on a single double: the far side begins behind it, which the restart knows
@@ -112,7 +112,7 @@ class Labels:
         found: list[Array] = []
         for way, side in zip((-1.0, 1.0), sides, strict=True):
             t = np.clip(first + way * AROUND * np.spacing(first), low, high)
-            label = self.at(np.tile(index, len(AROUND)), t.ravel()).reshape(t.shape)
+            label = self.labels_at(np.tile(index, len(AROUND)), t.ravel()).reshape(t.shape)
             astray = np.where(label != side, AROUND, 0.0 if exact else OTHERS).max(axis=0)
             found.append(np.clip(first + 2.0 * way * astray * np.spacing(first), low, high))  # some may lie between
         return found
@@ -125,7 +125,7 @@ class Labels:
             open_ = np.flatnonzero((middle > low) & (middle < high) & (high > early))
             if not open_.size:
                 break
-            same = self.at(index[open_], middle[open_]) == start[open_]
+            same = self.labels_at(index[open_], middle[open_]) == start[open_]
             low[open_[same]] = middle[open_[same]]
             high[open_[~same]] = middle[open_[~same]]
         return high

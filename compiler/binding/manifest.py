@@ -13,7 +13,7 @@ from sysdyn.compiler.binding.binding import Binding
 from sysdyn.compiler.forms.descriptor import BESIDE, DescriptorForm, Equations, Unknowns
 from sysdyn.compiler.formulations import COMPLEMENTARY
 from sysdyn.compiler.model.integers import Index, Reference
-from sysdyn.compiler.model.mirror import letter, spelled
+from sysdyn.compiler.model.mirror import family_name, letter
 from sysdyn.compiler.model.parameters import Extents
 from sysdyn.compiler.network.authors import Authors, owner
 from sysdyn.compiler.program.program import Pattern, Program
@@ -28,7 +28,7 @@ def structure(form: DescriptorForm, program: Program, network: Network) -> dict[
     """
     elements = {family: [[n, p.file, p.start[0]] for n, p in each] for family, each in network.authors.items()}
 
-    def gathered(name: str) -> dict[str, Any]:
+    def element_list(name: str) -> dict[str, Any]:
         """[name, file, line] of each element of a gathered family, from index 0 on: one list for all that it holds."""
         family = owner(name, network.authors)
         return {} if family is None else {"elements": elements[family]}
@@ -37,8 +37,8 @@ def structure(form: DescriptorForm, program: Program, network: Network) -> dict[
         "complementary": form.formulation in COMPLEMENTARY,
         "branches": [program.scalars.index(k.branch) for k in form.kinks if k.slide],
         "switches": [{"owner": s.label, "at": list(s.at)} for s in network.switches if s.holds is None],
-        "families": [_family(f) | gathered(f.name) for f in form.families],
-        "rows": [_row(r) | gathered(r.label) for r in form.rows],
+        "families": [_family(f) | element_list(f.name) for f in form.families],
+        "rows": [_row(r) | element_list(r.label) for r in form.rows],
         "blocks": {name: {"kernels": [_kernel(k) for k in patterns]} for name, patterns in program.patterns},
     }
 
@@ -64,6 +64,7 @@ def where(place: Place | None) -> dict[str, Any]:
 
 
 def _kernel(pattern: Pattern) -> dict[str, Any]:
+    """Entry of a kernel: loops, rows, entries of both Jacobians, and what its values read."""
     return {
         "loops": [[_bound(a), _bound(b)] for a, b in pattern.loops],
         "rows": [_reference(r) for r in pattern.rows],
@@ -82,7 +83,7 @@ def _bound(index: Index) -> int | list[int]:
 
 
 def _reference(place: Reference) -> list[Any]:
-    return [place.family, [i.listed() for i in place.indices]]
+    return [place.family, [i.as_list() for i in place.indices]]
 
 
 def manifest(
@@ -117,7 +118,7 @@ def _plain(value: Any) -> Any:
     return value if isinstance(value, float) else value.tolist()
 
 
-def named(name: str, box: Extents) -> dict[str, Any]:
+def family_entry(name: str, box: Extents) -> dict[str, Any]:
     """The entry of a family: name[first..last] with its shape; the name alone for a scalar."""
     if not box:
         return {"name": name}
@@ -138,12 +139,13 @@ def _each(name: str, box: Extents, authors: Authors) -> list[dict[str, Any]]:
     """The entry of a family, or those of the elements of a gathered one."""
     family = owner(name, authors)
     if family is None:
-        return [named(name, box)]
+        return [family_entry(name, box)]
     tail = re.sub(r"^\.\d+", "", name[len(family) :])
     return [{"name": authors[family][k][0] + tail} for k in range(box[0][0], box[0][1] + 1)]
 
 
 def _unknowns(form: DescriptorForm, program: Program, binding: Binding, authors: Authors) -> list[dict[str, Any]]:
+    """Entries of all unknowns, element by element: name, kind, unit, and whether its rate stands in an equation."""
     moving = {
         column.family
         for name, patterns in program.patterns
@@ -155,7 +157,7 @@ def _unknowns(form: DescriptorForm, program: Program, binding: Binding, authors:
         if family.kind not in BESIDE:
             moves = family.kind == "q" or k in moving
             plain = {"kind": letter(form.formulation, family.kind), "unit": family.unit, "differential": moves}
-            name = spelled(form.formulation, family.name, family.kind)
+            name = family_name(form.formulation, family.name, family.kind)
             found += [{**own, **plain} for own in _each(name, binding.shapes[k], authors)]
     return found
 

@@ -19,11 +19,11 @@ from sysdyn.compiler.model.terms import has_reduction
 from sysdyn.dsl.model.calculus import derivative
 from sysdyn.dsl.model.expression import (
     Node,
+    combine_terms,
     const,
     index,
     is_const,
     rebuild,
-    reduced,
     substitute,
     topological,
     topological_unbound,
@@ -72,7 +72,7 @@ class Oracle:
                     np.add.at(r, self.to[summand.row] + np.broadcast_to(where, values.shape), np.abs(c * values))
         return r
 
-    def undefined(
+    def find_undefined(
         self, block: str, t: float, y: Array, yd: Array, *, infinite: bool = True
     ) -> tuple[int, Node, list[float]] | None:
         """(row family, node, its arguments) of the first operation that makes of numbers what is none; None: there is
@@ -81,6 +81,7 @@ class Oracle:
         point = (t, y, yd)
         for kernel in self._kernels(block):
             for summand in kernel.rows:
+                # operations that can fail on finite arguments
                 nodes = [n for n in topological([summand.expression]) if n.op in ("table", "call", "pow", "mul", "sum")]
                 nodes = [n for n in nodes if not has_reduction(n)]
                 roots = (*nodes, *(a for n in nodes for a in n.args))
@@ -88,6 +89,7 @@ class Oracle:
                     continue
                 values = over(kernel.nest, roots, lambda n, a: self._leaf(n, a, point))
                 rest = iter(values[len(nodes) :])
+                # the first whose arguments are finite and whose value is not
                 for node, value in zip(nodes, values[: len(nodes)], strict=True):
                     arguments = [next(rest) for _ in node.args]
                     wrong = ~np.isfinite(value) if infinite else np.isnan(value)
@@ -110,6 +112,7 @@ class Oracle:
         return v, rows, columns
 
     def _entry(self, kernel: Kernel, k: int, column: Node, point: Point) -> tuple[Array, Array, Array]:
+        """One entry of a Jacobian over a kernel's iterations: values, rows and columns."""
         summand = kernel.rows[k]
         family = self._families[column.data[0], column.data[1]]
         slope = derivative(summand.expression, column)
@@ -127,6 +130,7 @@ class Oracle:
         return kernel if rows == kernel.rows else replace(kernel, rows=rows)
 
     def _elements(self, root: Node) -> Node:
+        """An expression whose products and extrema over ranges are written out, as derivatives want them; sums stay."""
         done: dict[Node, Node] = {}
         for node in topological_unbound([root]):
             args = tuple(done.get(a, a) for a in node.args)
@@ -139,7 +143,7 @@ class Oracle:
                 continue
             first, last = (round(float(v[0])) for v in over((), bounds, self.binding.parameters.lookup))
             parts = [substitute(body, {name: const(float(k))}) for k in range(first, last + 1)]
-            done[node] = reduced(node.data[0], parts)
+            done[node] = combine_terms(node.data[0], parts)
         return done[root]
 
     def _kernels(self, name: str) -> tuple[Kernel, ...]:
@@ -152,9 +156,11 @@ class Oracle:
         return positions(box, [np.rint(a).astype(np.int64) for a in at])
 
     def _leaf(self, node: Node, args: list[Value], point: Point) -> Value:
+        """Value of a leaf at a point (t, y, y'): time, unknowns by place, constants of integrated rows, parameters."""
         t, y, yd = point
         if node.op == "time":
             return t
+        # f, q, p or a rate: by its place in y or y'
         if node.op == "var":
             owner, kind, order = node.data
             family = self._families[owner, kind]
@@ -162,6 +168,7 @@ class Oracle:
             whole = [np.rint(a).astype(np.int64) for a in args]
             place = self.at[family] + (positions(box, whole) if box else 0)
             return (yd if order else y)[place]
+        # the constant of an integrated row, which no text gives
         if node.op == "param" and node.data in self._constants:
             label, values = self._constants[node.data]
             owners = {r.owner: self.binding.row_shapes[k] for k, r in enumerate(self.form.rows) if r.block == "phi"}

@@ -62,13 +62,14 @@ def pulses(
     """
     outlines = {t.name: _outline(t) for t in tables if len(t.points) == 1}
     found: list[Array] = []
+    # each element by itself, up to a number of elements
     for root, nest in _signals(form, crossed):
         columns = grid(nest, binding.parameters.lookup)
         number = len(next(iter(columns.values()))) if columns else 1
         for k in range(min(number, ELEMENTS)):
             held = {name: float(values[k]) for name, values in columns.items()}
             try:
-                found += _of(_bounded(root, _fixed(binding, held), outlines), t0, t1, known)
+                found += _pulses_of(_outline_of(root, _evaluator_at_rest(binding, held), outlines), t0, t1, known)
             except KeyError:  # a constant that is known at the start only
                 break
     times = distinct(np.zeros(0), *found)
@@ -91,7 +92,7 @@ def quickest(binding: Binding, t0: float, t1: float, read: Sequence[Node], form:
     return found
 
 
-def _fixed(binding: Binding, held: Mapping[str, float]) -> Values:
+def _evaluator_at_rest(binding: Binding, held: Mapping[str, float]) -> Values:
     """Values of what does not depend on time, in one iteration of the loops around it."""
 
     def look(node: Node, args: list[Value]) -> Value:
@@ -114,19 +115,22 @@ def _signals(form: DescriptorForm | None, crossed: Sequence[Node]) -> Iterator[t
             continue
         seen.add((root, nest))
         alone = variables(root)
+        # of time alone, and curved: of a straight line no pulse can be missed
         if alone and all(leaf.op == "time" for leaf in alone):
             curved = any(n.op in ("call", "pow", "table", "mul") for n in topological_unbound([root]))
             if curved and root.op != "reduce":
                 yield root, nest
             continue
+        # its body may be of time alone
         if root.op == "reduce":
             first, last, body = root.args
             stack.append((body, (*nest, Loop(root.data[1], first, last))))
+        # mixed: look at its parts
         elif alone:
             stack += [(a, nest) for a in root.args]
 
 
-def _bounded(root: Node, fixed: Values, outlines: Mapping[str, Outline]) -> Outline:
+def _outline_of(root: Node, fixed: Values, outlines: Mapping[str, Outline]) -> Outline:
     """Bounds by the expression itself and, from both ends of an interval, by its slope.
 
     A sum of terms that rise and fall is bounded by the first as if they were independent; where the slope has one sign
@@ -170,6 +174,7 @@ def _cells(signal: Outline, t0: float, t1: float) -> Array:
     done: list[Array] = [edges[-1:]]
     low, high = edges[:-1], edges[1:]
     size = 0.0
+    # halve each cell whose bounds allow more than its ends show
     for _ in range(DEPTH):
         ends = [signal(t, t)[0] for t in (low, high)]
         size = max(size, *(float(np.abs(e[np.isfinite(e)]).max(initial=0.0)) for e in ends))
@@ -179,12 +184,14 @@ def _cells(signal: Outline, t0: float, t1: float) -> Array:
             varies = most - least
         # what is bounded by nothing hides anything; a pulse that no end met yet is measured by its own bounds
         whole = np.where(np.isfinite(varies), np.maximum(np.abs(least), np.abs(most)), np.inf)
+        # hides little and varies little
         plain = (hidden <= HIDDEN * size) & (varies <= VARIES * size)
         open_ = ~plain & ~(whole <= HIDDEN * size)
         done.append(low[~open_])
         low, high = low[open_], high[open_]
         if not low.size:
             return distinct(*done)
+        # a signal that varies everywhere is no pulse
         if low.size > MOST:
             return np.zeros(0)
         middle = low + 0.5 * (high - low)
@@ -192,7 +199,7 @@ def _cells(signal: Outline, t0: float, t1: float) -> Array:
     return distinct(*done, low)
 
 
-def _of(signal: Outline, t0: float, t1: float, known: Array) -> Iterator[Array]:
+def _pulses_of(signal: Outline, t0: float, t1: float, known: Array) -> Iterator[Array]:
     """Instants of each pulse of one signal: the edges of its small cells, thinned to five.
 
     What is small is asked again and again, each time FINER, so that a pulse is found on a signal that varies by itself.
@@ -201,17 +208,22 @@ def _of(signal: Outline, t0: float, t1: float, known: Array) -> Iterator[Array]:
     width = np.diff(edges)
     taken = np.zeros(width.size, dtype=bool)
     narrow, number = NARROW * (t1 - t0), 0
+    # each round with a larger notion of what is narrow
     while width.size and width.min() < FINE * narrow:
         change = np.diff(np.concatenate([[0], (width < narrow).astype(int), [0]]))
         runs = []
+        # runs of neighbouring narrow cells, short as a whole
         for first, last in zip(np.flatnonzero(change == 1), np.flatnonzero(change == -1), strict=True):
             fine = width[first:last].min() < FINE * narrow
             short = edges[last] - edges[first] <= ISOLATED * narrow
             if fine and short and not taken[first:last].any():
                 taken[first:last] = True
                 runs.append(edges[first : last + 1])
+        # monotone runs are edges between two levels: steps see them
         yield from (
-            _within(signal, run) for run, told in zip(runs, _told(signal, runs, stops), strict=True) if not told
+            _quartiles(signal, run)
+            for run, told in zip(runs, _is_monotone(signal, runs, stops), strict=True)
+            if not told
         )
         number += len(runs)
         narrow *= FINER
@@ -219,7 +231,7 @@ def _of(signal: Outline, t0: float, t1: float, known: Array) -> Iterator[Array]:
             return
 
 
-def _told(signal: Outline, runs: Sequence[Array], stops: Array) -> Sequence[bool]:
+def _is_monotone(signal: Outline, runs: Sequence[Array], stops: Array) -> Sequence[bool]:
     """Of each run of cells whether the signal only rises or falls between stops in it, and rests before and behind."""
     if not runs:
         return ()
@@ -240,7 +252,7 @@ def _told(signal: Outline, runs: Sequence[Array], stops: Array) -> Sequence[bool
     return list(told)
 
 
-def _within(signal: Outline, edges: Array) -> Array:
+def _quartiles(signal: Outline, edges: Array) -> Array:
     """The ends of a pulse, and where it changes most: quarters of its total variation."""
     value = signal(edges, edges)[0]
     travelled = np.concatenate([[0.0], np.cumsum(np.abs(np.diff(np.nan_to_num(value))))])

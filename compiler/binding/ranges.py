@@ -46,9 +46,9 @@ class Ranges:
 
     def extremes(self, node: Node, bounds: Bounds) -> tuple[float, float]:
         """Least and largest value of an affine index."""
-        return self._at(node, bounds, 0), self._at(node, bounds, 1)
+        return self._end_value(node, bounds, 0), self._end_value(node, bounds, 1)
 
-    def _at(self, node: Node, bounds: Bounds, side: int) -> float:
+    def _end_value(self, node: Node, bounds: Bounds, side: int) -> float:
         def lookup(leaf: Node, args: list[Value]) -> Value:
             if leaf.op == "index" and leaf.data in bounds:
                 return bounds[leaf.data][side]
@@ -59,6 +59,7 @@ class Ranges:
     def outside(self, root: Node, bounds: Bounds) -> Iterator[str]:
         """Messages for the references below root."""
         for node in topological_unbound([root]):
+            # the least and the largest index against the family's box
             if node.op in ("var", "param") and node.args:
                 name = node.data[0] if node.op == "var" else node.data
                 box = self.owners.get(name) if node.op == "var" else self.parameters.boxes.get(name)
@@ -66,6 +67,7 @@ class Ranges:
                     low, high = self.extremes(at, bounds)
                     if low < first or high > last:
                         yield f"{name}: index {low if low < first else high:g} outside {first}..{last}"
+            # the loop variable ranges between its own extremes
             elif node.op == "reduce":
                 first_, last_, body = node.args
                 inner = self.extremes(first_, bounds)[0], self.extremes(last_, bounds)[1]
@@ -75,6 +77,7 @@ class Ranges:
 
 def _statements(model: EnergyModel) -> Iterator[tuple[Iterable[Node], Nest, Place]]:
     """Expressions, their loops and where they are written."""
+    # in the order of the model: functions, works, rows, initial values, what is traced
     for name in model.functions:
         for term in model.function(name):
             yield (term.expression,), term.loops, term.place

@@ -119,6 +119,7 @@ class SampledRows:
     ) -> None:
         """What a kernel adds to the rows kept, at all points: iterations times points in one array."""
         wanted = np.zeros(rows[0].size, dtype=bool) if rows else np.zeros(0, dtype=bool)
+        # iterations that add to a row which is sampled
         for where in rows:
             wanted |= kept[where]
         some = np.flatnonzero(wanted)
@@ -127,6 +128,7 @@ class SampledRows:
         number, count = points.t.size, some.size
         inside = {name: np.tile(values[some], number) for name, values in columns.items()}
         which = np.repeat(np.arange(number), count)
+        # term by term, so that the size of a row is that of its terms
         scaled = [(k, c, term) for k, s in enumerate(kernel.rows) for c, term in _terms(s.expression)]
         roots = [term for _, _, term in scaled]
 
@@ -135,6 +137,7 @@ class SampledRows:
 
         found = evaluate(roots, lookup)
         sizes = magnitudes(roots, lookup, self.binding.parameters.table_size) if careful else found
+        # several iterations may add to one row
         for (k, c, _), result, large in zip(scaled, found, sizes, strict=True):
             own = np.flatnonzero(kept[rows[k][some]])
             where = np.searchsorted(sample.rows, rows[k][some[own]])
@@ -159,15 +162,18 @@ class SampledRows:
         return positions(box, [np.atleast_1d(np.rint(a).astype(np.int64)) for a in at])
 
     def _leaf(self, node: Node, args: list[Value], columns: dict[str, Array], which: Whole, points: Points) -> Value:
+        """Value of a leaf at every iteration and point: loop variables, time, unknowns, constants, parameters."""
         if node.op == "index" and node.data in columns:
             return columns[node.data]
         if node.op == "time":
             return points.t[which]
+        # f, q, p or a rate: by its place in y or y' of the point
         if node.op == "var":
             owner, kind, order = node.data
             family = self._families[owner, kind]
             place = self.at[family] + self._position(self.binding.shapes[family], args)
             return (points.yd if order else points.y)[which, np.broadcast_to(place, which.shape)]
+        # the constant of an integrated row, which no text gives
         if node.op == "param" and node.data in self._constants:
             box, values = self._constants[node.data]
             return values[self._position(box, args)] if args else values[0]

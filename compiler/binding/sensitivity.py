@@ -55,7 +55,7 @@ class Sensitivity:
     ) -> None:
         """at: the index of an element; network: its parameters may be formulas in others."""
         slopes = [_Slope(network, binding, rate_name(name, order), at) for order in range(LAST + 1)]
-        blocks = _by_order(form, [{b.name: _changed(b, slope) for b in form.blocks} for slope in slopes])
+        blocks = _by_order(form, [{b.name: _map_rows(b, slope) for b in form.blocks} for slope in slopes])
         self._oracles = [
             Oracle(replace(form, blocks=tuple(Block(n, tuple(k)) for n, k in blocks.get(order, {}).items())), binding)
             for order in range(FIRST, LAST + 1)
@@ -83,13 +83,13 @@ class _Slope:
     def _seeds(self, expression: Node) -> dict[Node, Node]:
         nodes = [n for n in topological([expression]) if n.op == "param"]
         seeds = {n: self._own(n) for n in nodes if n.data == self._name}
-        return seeds | {n: self._of(n) for n in nodes if n.data in self._follow}
+        return seeds | {n: self._parameter_slope(n) for n in nodes if n.data in self._follow}
 
     def _own(self, node: Node) -> Node:
         """1 where the indices are those of the element."""
         return _where(node.args, self._at, const(1.0), const(0.0))
 
-    def _of(self, node: Node) -> Node:
+    def _parameter_slope(self, node: Node) -> Node:
         """The slope of a parameter by its formula: over its indices, element by element, or of an element apart."""
         p = self._known[node.data]
         loops = {index(name): at for name, at in zip(p.indices, node.args, strict=False)}
@@ -129,21 +129,24 @@ def _by_order(form: DescriptorForm, by: Sequence[dict[str, list[Kernel]]]) -> di
             if rows:
                 found.setdefault(order, {}).setdefault(block, []).append(Kernel(kernel.nest, rows))
 
+    # the derivative of a row by u' is the derivative of its rate by u'', and so on
     for order, slopes in enumerate(by):
         for name in slopes.keys() - {*_DERIVED, "phi"}:
             put(order, name, slopes[name])
+        # constraints by themselves, and those that were integrated from flow constraints one order lower
         put(order, "phi", slopes.get("phi", ()), own=False)
         put(order - 1, "phi", slopes.get("phi_rate", ()), own=True)
         put(order, "phi_rate", slopes.get("phi_rate", ()), own=True)
         put(order + 1, "phi_acceleration", slopes.get("phi_rate", ()), own=True)
         put(order + 2, "phi_acceleration", slopes.get("phi", ()), own=False)
+        # rates of balances follow from the rows whose rates they are
         for name, bases in RATES.items():
             for base in bases:
                 put(order + 1, name, slopes.get(base, ()), own=False if base == "phi" else None)
     return found
 
 
-def _changed(block: Block, change: Callable[[Node], Node]) -> list[Kernel]:
+def _map_rows(block: Block, change: Callable[[Node], Node]) -> list[Kernel]:
     """The block with its expressions changed, without the rows that are zero."""
     kernels = (
         Kernel(k.nest, tuple(replace(s, expression=change(s.expression)) for s in k.rows)) for k in block.kernels

@@ -79,8 +79,10 @@ class Algebra:
                     done[node] = args[0] ** args[1]
                 case "call" if node.data in _NAMES:
                     done[node] = getattr(sympy, _NAMES[node.data])(*args)
+                # a signal is its value: signs of virtual work do not matter here
                 case "call" if node.data == "signal":
                     done[node] = args[0]
+                # leaves, and what sympy does not know, as symbols
                 case _:
                     done[node] = self.symbol(node)
         return done[root]
@@ -94,7 +96,9 @@ class Algebra:
         return done[root]
 
     def _one(self, part: Any, args: list[Node]) -> Node:
+        """Node of a sympy object from those of its arguments."""
         sympy = self.sympy
+        # a symbol that stands for a node sympy did not look into
         if part in self._nodes:
             return self._nodes[part]
         if part.is_Number or part is sympy.pi:
@@ -103,10 +107,12 @@ class Algebra:
             return add(*args)
         if part.is_Mul:
             return product(1.0, ((1.0, a) for a in args))
+        # x^2 keeps its number as an exponent, a^b is a call
         if part.is_Pow:
             return product(1.0, ((float(part.exp), args[0]),)) if part.exp.is_Number else power(*args)
         if isinstance(part, sympy.exp):
             return call("exp", *args)
+        # sin, cos, ...: the functions that both know
         for ours, theirs in _NAMES.items():
             if isinstance(part, getattr(sympy, theirs)):
                 return call(ours, *args)

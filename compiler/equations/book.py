@@ -11,10 +11,10 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 
 from sysdyn.compiler.equations.algebra import Algebra
-from sysdyn.compiler.equations.joining import joined, shorter
+from sysdyn.compiler.equations.joining import collect_terms, shorter
 from sysdyn.compiler.equations.order import Order
 from sysdyn.compiler.equations.pieces import Piece, pieces
-from sysdyn.compiler.forms.conjugates import signed
+from sysdyn.compiler.forms.conjugates import negate_conjugates
 from sysdyn.compiler.forms.descriptor import BESIDE, DescriptorForm, Equations
 from sysdyn.compiler.forms.efforts import PREFIX, effort
 from sysdyn.compiler.forms.lowering import whole
@@ -131,7 +131,7 @@ def _of_row(algebra: Algebra, row: Equations, found: Sequence[Piece]) -> Iterato
         groups.setdefault((piece.where, piece.fixed), []).append(piece)
     wide = sorted(groups or {((), ()): []}, key=lambda key: (len(key[1]), -len(key[0])))
     for number, (where, fixed) in enumerate(wide):
-        terms = gathered(algebra, [(p.over, p.expression) for p in groups.get((where, fixed), [])])
+        terms = sum_terms(algebra, [(p.over, p.expression) for p in groups.get((where, fixed), [])])
         left, right = sides(row.block, terms) if len(groups) <= 1 else ((), terms)
         if row.kind == "kinematic":  # f = S u + s of Kane's form
             flow = var(row.owner, "f")
@@ -142,32 +142,37 @@ def _of_row(algebra: Algebra, row: Equations, found: Sequence[Piece]) -> Iterato
         yield Equation(kind, row.owner, row.place, left, right, where, fixed, number > 0)
 
 
-def gathered(algebra: Algebra, parts: Sequence[tuple[Nest, Node]], *, whole: bool = False) -> tuple[Summed, ...]:
+def sum_terms(algebra: Algebra, parts: Sequence[tuple[Nest, Node]], *, whole: bool = False) -> tuple[Summed, ...]:
     """Terms under one nest joined; whole: squares of differences stay where that is shorter."""
     nests: dict[Nest, list[Node]] = {}
     for over, expression in parts:
         nests.setdefault(over, []).append(expression)
-    join = shorter if whole else joined
+    join = shorter if whole else collect_terms
     return tuple(Summed(over, term) for over, some in nests.items() for term in join(algebra, add(*some)))
 
 
 def sides(block: str, terms: Sequence[Summed]) -> tuple[tuple[Summed, ...], tuple[Summed, ...]]:
     """The sides of a row "sum of terms = 0"."""
     leading = [_class(term.expression) for term in terms]
+    # constraints have everything on the right: 0 = ...
     if block in ("phi", "psi", "gamma"):
         return (), tuple(terms)
+    # p on the left, or f where it stands alone: f = p/m
     if block == "momentum":
         bare = ("var" in (t.expression.op, t.negated.expression.op) for t in terms)
         alone = any(k == "f" and own for k, own in zip(leading, bare, strict=True))
         kept = ["f"] if alone and "p" in leading else ["p"] if "p" in leading else ["f"]
+    # the balance of an element: p' = efforts, s' = power
     elif "p'" in leading or "s'" in leading:
         kept = ["p'", "s'"]
     else:
         kept = ["f'", "multiplier"]
     pairs = list(zip(terms, leading, strict=True))
     left = tuple(t for t, kind in pairs if kind in kept)
+    # multipliers last
     rest = sorted((pair for pair in pairs if pair[1] not in kept), key=lambda pair: pair[1] == "multiplier")
     right = tuple(t.negated for t, _ in rest)
+    # -p' = e reads p' = -e
     if left and _negative(left[0].expression):
         return tuple(t.negated for t in left), tuple(t.negated for t in right)
     return left, right
@@ -196,7 +201,7 @@ def classes(algebra: Algebra, model: EnergyModel, form: DescriptorForm) -> Itera
         nest, at = whole(family)
         for name in CLASSES:
             acting = resolve(model, carriers, effort(model, var(family.name, f"{PREFIX}{name}", *at)))
-            found = joined(algebra, signed(acting) if complementary else acting)
+            found = collect_terms(algebra, negate_conjugates(acting) if complementary else acting)
             if found:
                 left = param(f"{'f' if complementary else 'e'}_{name}_{family.name}", *at)
                 right = tuple(Summed((), term) for term in found)
@@ -208,13 +213,14 @@ def functions(algebra: Algebra, model: EnergyModel) -> Iterator[Function]:
     for name in FUNCTIONS:
         if model.function(name):
             parts = [(t.loops, t.expression) for t in model.function(name)]
-            yield Function(name, gathered(algebra, parts, whole=True))
+            yield Function(name, sum_terms(algebra, parts, whole=True))
     works: dict[tuple[Nest, Node], list[Node]] = {}
+    # efforts along each coordinate that the work moves
     for work in model.works:
         for node in sorted(variables(work.on), key=lambda n: n.number):
             if node.op == "var":
                 effort = mul(work.effort, derivative(work.on, node))
                 works.setdefault((work.loops, node), []).append(effort)
-    efforts = {key: joined(algebra, add(*found)) for key, found in works.items()}
+    efforts = {key: collect_terms(algebra, add(*found)) for key, found in works.items()}
     if any(efforts.values()):
         yield Function("W", (), tuple(Effort(loops, terms, on) for (loops, on), terms in efforts.items() if terms))

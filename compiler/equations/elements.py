@@ -14,7 +14,7 @@ from collections.abc import Iterator
 
 from sysdyn.compiler.equations.algebra import Algebra
 from sysdyn.compiler.equations.book import Equation, Summed
-from sysdyn.compiler.equations.joining import joined
+from sysdyn.compiler.equations.joining import collect_terms
 from sysdyn.compiler.network.primal.choices import ENERGY, OWN, Causality, conjugate, own
 from sysdyn.compiler.network.primal.slopes import Slopes
 from sysdyn.dsl.model.calculus import derivative
@@ -34,7 +34,7 @@ def elements(algebra: Algebra, network: Network) -> Iterator[Equation]:
         label = f"{branch.name} ({EDGES[branch.kind]})"
         whole = [(named[own(branch, f"b{branch.side}")], branch.law), *_functions(branch, slopes, network, letters)]
         for left, value in whole:
-            terms = joined(algebra, substitute(value, named))
+            terms = collect_terms(algebra, substitute(value, named))
             right = tuple(Summed((), term) for term in terms)
             yield Equation("element", label, branch.place, (Summed((), left),), right, branch.loops)
 

@@ -27,12 +27,13 @@ def moving(node: Node) -> bool:
     return node.op == "var" and (node.data[2] > 0 or node.data[1] not in ("q", "s"))
 
 
-def joined(algebra: Algebra, root: Node) -> tuple[Node, ...]:
+def collect_terms(algebra: Algebra, root: Node) -> tuple[Node, ...]:
     """The terms of an expression, rates first, then multipliers, flows, and what does not move."""
     if is_const(root, 0.0):
         return ()
     whole = algebra.object(root)
     leaves = sorted((n for n in variables(root) if moving(n)), key=_leading)
+    # in rates, multipliers and flows
     polynomial = _polynomial(algebra, whole, leaves)
     if polynomial is None:  # flows inside of functions: what is linear in rates and multipliers is still apart
         leaves = [n for n in leaves if n.data[2] or n.data[1] in ("kappa", "mu")]
@@ -40,6 +41,7 @@ def joined(algebra: Algebra, root: Node) -> tuple[Node, ...]:
     if polynomial is None:
         return tuple(_split(algebra, whole))
     found: list[Node] = []
+    # each monomial with its coefficient as short as it gets
     for powers, coefficient in polynomial:
         short = shortest(algebra, coefficient)
         if short == 0:
@@ -49,15 +51,15 @@ def joined(algebra: Algebra, root: Node) -> tuple[Node, ...]:
             continue
         pairs = sorted(zip(powers, leaves, strict=True), key=lambda pair: algebra.order.rank(pair[1]))
         held = product(1.0, ((float(k), leaf) for k, leaf in pairs if k))
-        found.append(mul(ordered(algebra, algebra.node(short)), held))
+        found.append(mul(sort_factors(algebra, algebra.node(short)), held))
     return tuple(found)
 
 
 def shorter(algebra: Algebra, root: Node) -> tuple[Node, ...]:
     """The terms of an expression, as written or joined, whichever is shorter."""
     plain = algebra.sympy.Add.make_args(algebra.object(root))
-    written = tuple(ordered(algebra, algebra.node(part)) for part in plain if part != 0)
-    found = joined(algebra, root)
+    written = tuple(sort_factors(algebra, algebra.node(part)) for part in plain if part != 0)
+    found = collect_terms(algebra, root)
     return min((found, written), key=lambda terms: length(algebra, terms))
 
 
@@ -77,7 +79,7 @@ def _polynomial(algebra: Algebra, whole: Any, leaves: Sequence[Node]) -> list[tu
     sympy = algebra.sympy
     symbols = [algebra.symbol(leaf) for leaf in leaves]
     rest, inside = whole.as_independent(*symbols, as_Add=True)
-    opened = _opened(sympy, inside)
+    opened = _expand_products(sympy, inside)
     found: dict[tuple[int, ...], Any] = {}
     for term in sympy.Add.make_args(opened):
         coefficient, moves = term.as_independent(*symbols, as_Add=False)
@@ -91,7 +93,7 @@ def _polynomial(algebra: Algebra, whole: Any, leaves: Sequence[Node]) -> list[tu
     return [*sorted(found.items(), reverse=True), *([(still, rest)] if rest != 0 else [])]
 
 
-def _opened(sympy: Any, whole: Any) -> Any:
+def _expand_products(sympy: Any, whole: Any) -> Any:
     """Products of sums multiplied out, functions and what stands below left as they are."""
     held = {p: sympy.Dummy() for p in _over_sums(sympy, whole)}
     opened = sympy.expand(whole.xreplace(held), power_base=False, power_exp=False, log=False, basic=False)
@@ -108,11 +110,13 @@ def shortest(algebra: Algebra, coefficient: Any) -> Any:
     sympy = algebra.sympy
     size = coefficient.count_ops()
     algebra.spent += size
+    # each simplification costs: large ones and late ones stay as they are
     if size > LARGEST or algebra.spent > GRANTED:
         return coefficient
-    whole, held = _closed(sympy, coefficient)
+    whole, held = _abstract_functions(sympy, coefficient)
     forms = [whole]
     waves = coefficient.has(sympy.sin, sympy.cos)
+    # several rewritings are tried, and the shortest wins
     ways: list[Callable[[Any], Any]] = [sympy.factor]
     if waves and _over_sums(sympy, coefficient):
         pass  # its factors are looked at one by one
@@ -132,7 +136,7 @@ def shortest(algebra: Algebra, coefficient: Any) -> Any:
     return min(forms, key=lambda c: (sympy.count_ops(c, visual=False), str(c)))
 
 
-def _closed(sympy: Any, whole: Any) -> tuple[Any, dict[Any, Any]]:
+def _abstract_functions(sympy: Any, whole: Any) -> tuple[Any, dict[Any, Any]]:
     """Exponentials and broken powers as symbols, sines of many times an angle as those of one, and what these are: in
     polynomials exp(99 t) is of degree 99, and sin(64 t) becomes one in those of t.
     """
@@ -162,7 +166,7 @@ def _split(algebra: Algebra, whole: Any) -> list[Node]:
     if whole.is_Add or whole.is_Mul:
         forms.append(_alike(algebra, whole))
     best = min(forms, key=lambda parts: len(parts) + sum(int(p.count_ops()) for p in parts))
-    nodes = [ordered(algebra, algebra.node(part)) for part in best]
+    nodes = [sort_factors(algebra, algebra.node(part)) for part in best]
     return sorted((n for n in nodes if not is_const(n, 0.0)), key=lambda n: (n.op == "const", _first(n)))
 
 
@@ -173,7 +177,7 @@ def _alike(algebra: Algebra, whole: Any) -> list[Any]:
         return list(sympy.Add.make_args(whole))
     still = {s for s in whole.free_symbols if algebra.node(s).op == "param"}
     found: dict[Any, Any] = {}
-    for term in sympy.Add.make_args(_opened(sympy, whole)):
+    for term in sympy.Add.make_args(_expand_products(sympy, whole)):
         held, moves = term.as_independent(*(whole.free_symbols - still), as_Add=False)
         found[moves] = found.get(moves, 0) + held
     parts = list(sympy.Add.make_args(found.pop(sympy.S.One, sympy.S.Zero)))
@@ -207,10 +211,10 @@ def _first(node: Node) -> tuple[int, int]:
     return (0, found[0]) if found else (1, node.number)
 
 
-def ordered(algebra: Algebra, node: Node) -> Node:
+def sort_factors(algebra: Algebra, node: Node) -> Node:
     """A product with its factors in the order of a book."""
     if node.op == "sum" and node.data[0] == 0.0 and len(node.args) == 1:
-        return mul(ordered(algebra, node.args[0]), const(node.data[1][0]))
+        return mul(sort_factors(algebra, node.args[0]), const(node.data[1][0]))
     if node.op != "mul":
         return node
     pairs = sorted(zip(node.data, node.args, strict=True), key=lambda pair: algebra.order.rank(pair[1]))

@@ -16,8 +16,8 @@ from dataclasses import replace
 from typing import Any
 
 from sysdyn.compiler.equations.algebra import Algebra
-from sysdyn.compiler.equations.book import Effort, Equation, Function, Summed, gathered, sides
-from sysdyn.compiler.equations.joining import joined, length, ordered, shortest, turned_factors
+from sysdyn.compiler.equations.book import Effort, Equation, Function, Summed, sides, sum_terms
+from sysdyn.compiler.equations.joining import collect_terms, length, shortest, sort_factors, turned_factors
 from sysdyn.compiler.forms.descriptor import DescriptorForm
 from sysdyn.compiler.forms.momenta import momentum
 from sysdyn.compiler.model.energies import EnergyModel
@@ -63,6 +63,7 @@ def rows_of(form: DescriptorForm, *blocks: str) -> list[Row]:
     with_reactions = {"dynamics": ("dynamics", "phi_reaction", "psi_reaction")}
     found: dict[tuple[str, int], list[Node]] = {}
     for name in blocks:
+        # constraint forces stand in blocks of their own
         for part in with_reactions.get(name, (name,)):
             block = form.block(part)
             for kernel in block.kernels if block is not None else ():
@@ -97,11 +98,11 @@ def matrices(algebra: Algebra, form: DescriptorForm) -> tuple[Matrix, ...]:
     found.append(Matrix("Φ_q", _jacobian(algebra, rows_of(form, "phi"), places)))
     found.append(Matrix("Ψ_f", _jacobian(algebra, rows_of(form, "psi"), flows)))
     rest = [neg(substitute(row.expression, still)) for row in dynamics]
-    found.append(Matrix("U" if carried else "Y", tuple((joined(algebra, node),) for node in rest)))
+    found.append(Matrix("U" if carried else "Y", tuple((collect_terms(algebra, node),) for node in rest)))
     for name, block in (("Z1", "phi_acceleration"), ("Z2", "psi_rate")):
         rows = rows_of(form, block)
         none = {n: const(0.0) for row in rows for n in variables(row.expression) if _is(n, "f", 1)}
-        found.append(Matrix(name, tuple((joined(algebra, substitute(row.expression, none)),) for row in rows)))
+        found.append(Matrix(name, tuple((collect_terms(algebra, substitute(row.expression, none)),) for row in rows)))
     return tuple(m for m in found if m.rows)
 
 
@@ -122,7 +123,7 @@ def _entry(algebra: Algebra, node: Node) -> tuple[Node, ...]:
     """The terms of an entry in its shortest form."""
     short = shortest(algebra, algebra.object(node))
     parts = algebra.sympy.Add.make_args(short) if short != 0 else ()
-    return tuple(ordered(algebra, algebra.node(part)) for part in parts)
+    return tuple(sort_factors(algebra, algebra.node(part)) for part in parts)
 
 
 def underlying(algebra: Algebra, form: DescriptorForm) -> list[Equation]:
@@ -134,7 +135,7 @@ def underlying(algebra: Algebra, form: DescriptorForm) -> list[Equation]:
     idle = {row.owner for row in rows if row.block == "momentum_rate" and var(row.owner, "f", order=1) not in read}
     rows = [row for row in rows if row.block != "momentum_rate" or row.owner not in idle]
     wanted = [n for n in wanted if not (_is(n, "f", 1) and n.data[0] in idle)]
-    solution = _solved(algebra, rows, wanted)
+    solution = _solve_rows(algebra, rows, wanted)
     found = []
     for node, value in zip(wanted, solution, strict=True):
         right = tuple(Summed((), term) for term in _quotient(algebra, value))
@@ -142,26 +143,26 @@ def underlying(algebra: Algebra, form: DescriptorForm) -> list[Equation]:
         if node.data[1] != "f" or not any(f.kind == "p" for f in form.families):
             found.append(Equation(kind, node.data[0], None, (Summed((), node),), right))
     for row in rows_of(form, "gamma", "lambda"):
-        left, right = sides(row.block, gathered(algebra, [((), row.expression)]))
+        left, right = sides(row.block, sum_terms(algebra, [((), row.expression)]))
         found.append(Equation(row.block, row.owner, row.place, left, right))
     return found
 
 
 def _quotient(algebra: Algebra, value: Any) -> tuple[Node, ...]:
     """A sympy object as terms, or as one term over a denominator that moves."""
-    apart = joined(algebra, algebra.node(value))
+    apart = collect_terms(algebra, algebra.node(value))
     above, below = algebra.sympy.fraction(algebra.sympy.factor(algebra.sympy.together(value)))
     if all(algebra.node(s).op == "param" for s in below.free_symbols):
-        return joined(algebra, algebra.node(algebra.sympy.expand(above) / below))
+        return collect_terms(algebra, algebra.node(algebra.sympy.expand(above) / below))
     below = turned_factors(algebra.sympy, below)
     factor, rest = above.as_independent(*(s for s in above.free_symbols if algebra.node(s).op != "param"), as_Add=False)
-    terms = joined(algebra, algebra.node(rest))
+    terms = collect_terms(algebra, algebra.node(rest))
     parts = ((1.0, algebra.node(factor)), (1.0, add(*terms)), (-1.0, algebra.node(below)))
-    whole = ordered(algebra, product(1.0, parts))
+    whole = sort_factors(algebra, product(1.0, parts))
     return apart if length(algebra, apart) <= length(algebra, (whole,)) else (whole,)
 
 
-def _solved(algebra: Algebra, rows: Sequence[Row], wanted: Sequence[Node]) -> list[Any]:
+def _solve_rows(algebra: Algebra, rows: Sequence[Row], wanted: Sequence[Node]) -> list[Any]:
     """The unknowns from rows that are linear in them.  NoSuchEquations where these are singular, too many, or none."""
     if not 0 < len(wanted) <= LARGEST or len(rows) != len(wanted):
         raise NoSuchEquations(
@@ -172,6 +173,7 @@ def _solved(algebra: Algebra, rows: Sequence[Row], wanted: Sequence[Node]) -> li
     sympy = algebra.sympy
     still = dict.fromkeys(wanted, const(0.0))
     matrix, right = [], []
+    # the matrix of slopes, and the right side where all unknowns are zero
     for row in rows:
         slopes = [derivative(row.expression, n) for n in wanted]
         if any(n in wanted for slope in slopes for n in variables(slope)):
@@ -179,7 +181,7 @@ def _solved(algebra: Algebra, rows: Sequence[Row], wanted: Sequence[Node]) -> li
         matrix.append([shortest(algebra, algebra.object(slope)) for slope in slopes])
         right.append(_plain(algebra, neg(substitute(row.expression, still))))
     a, b = sympy.Matrix(matrix), sympy.Matrix(right)
-    solution = _eliminated(sympy, a, b)
+    solution = _eliminate(sympy, a, b)
     if solution is None:
         raise NoSuchEquations(
             "there is no underlying equation: rates and multipliers do not follow from the rows differentiated once or"
@@ -190,16 +192,17 @@ def _solved(algebra: Algebra, rows: Sequence[Row], wanted: Sequence[Node]) -> li
 
 def _plain(algebra: Algebra, node: Node) -> Any:
     """The sympy object of the joined terms: differences of angles are one argument."""
-    return algebra.sympy.Add(*(algebra.object(term) for term in joined(algebra, node)))
+    return algebra.sympy.Add(*(algebra.object(term) for term in collect_terms(algebra, node)))
 
 
-def _eliminated(sympy: Any, a: Any, b: Any) -> list[Any] | None:
+def _eliminate(sympy: Any, a: Any, b: Any) -> list[Any] | None:
     """The solution of a x = b, unknowns with one entry in a row first, each simplified; None where a is singular."""
     rows = [[*a.row(k), b[k]] for k in range(a.rows)]
     n = a.cols
     pivots: list[tuple[int, int]] = []
     left = set(range(n))
     free = set(range(len(rows)))
+    # the pivot of the sparsest row, then of the shortest entry (Markowitz's order in symbols)
     while left:
         best = None
         for i in sorted(free):
@@ -214,7 +217,8 @@ def _eliminated(sympy: Any, a: Any, b: Any) -> list[Any] | None:
         free.discard(i)
         left.discard(j)
         pivot = rows[i][j]
-        rows[i] = [_readable(_divided(sympy, v, pivot)) for v in rows[i]]
+        rows[i] = [_readable(_divide_terms(sympy, v, pivot)) for v in rows[i]]
+        # Gauss-Jordan: above and below
         for k in range(len(rows)):
             factor = rows[k][j]
             if k != i and factor != 0:
@@ -227,7 +231,7 @@ def _eliminated(sympy: Any, a: Any, b: Any) -> list[Any] | None:
 
 
 def _readable(value: Any) -> Any:
-    """The same.  NoSuchEquations where it is longer than anyone reads: what follows from it takes minutes."""
+    """The value itself. NoSuchEquations where it is longer than anyone reads: what follows from it takes minutes."""
     if value.count_ops() > LONGEST:
         raise NoSuchEquations(
             f"the solution for rates and multipliers has entries of more than {LONGEST} operations: --form matrices"
@@ -236,7 +240,7 @@ def _readable(value: Any) -> Any:
     return value
 
 
-def _divided(sympy: Any, value: Any, pivot: Any) -> Any:
+def _divide_terms(sympy: Any, value: Any, pivot: Any) -> Any:
     """Each term of a value divided, and factored where that takes no minutes."""
     if value == 0:
         return value
@@ -249,11 +253,11 @@ def _simple(sympy: Any, value: Any) -> Any:
     value = sympy.together(value)
     if value.has(sympy.sin, sympy.cos) and value.count_ops() < 300:
         above, below = sympy.fraction(value)
-        value = _turned(sympy, sympy.expand(above)) / _turned(sympy, sympy.expand(below))
-    return _cancelled(sympy, value) if value.count_ops() < 600 else value
+        value = _sines_by_cosines(sympy, sympy.expand(above)) / _sines_by_cosines(sympy, sympy.expand(below))
+    return _cancel(sympy, value) if value.count_ops() < 600 else value
 
 
-def _cancelled(sympy: Any, value: Any) -> Any:
+def _cancel(sympy: Any, value: Any) -> Any:
     """Without common factors; by sparse polynomials, for in a dozen parameters dense ones take minutes."""
     try:
         _, fraction = sympy.polys.fields.sfield(value)
@@ -262,8 +266,8 @@ def _cancelled(sympy: Any, value: Any) -> Any:
     return fraction.as_expr()
 
 
-def _turned(sympy: Any, value: Any) -> Any:
-    """The same with squares of sines written by cosines: equal expressions become equal.  A sine that stands inside
+def _sines_by_cosines(sympy: Any, value: Any) -> Any:
+    """A value with squares of sines written by cosines: equal expressions become equal. A sine that stands inside
     another function, sin(w*t + a*sin(t)), stays.
     """
     if not value.has(sympy.sin):
@@ -287,7 +291,7 @@ def variation(algebra: Algebra, function: Function, form: DescriptorForm) -> Fun
     """
     whole = add(*(t.expression for t in function.terms))
     on = [n for kind in ("q", "p") for n in unknowns(form, kind)]
-    slopes = ((n, joined(algebra, derivative(whole, n))) for n in on)
+    slopes = ((n, collect_terms(algebra, derivative(whole, n))) for n in on)
     return Function(function.name, (), tuple(Effort((), terms, n) for n, terms in slopes if terms))
 
 
@@ -295,11 +299,12 @@ def canonical(algebra: Algebra, model: EnergyModel, form: DescriptorForm) -> tup
     """H(q, p) and Hamilton's equations without the flows of coordinates that carry a momentum."""
     if form.formulation != "hamiltonian":
         raise NoSuchEquations("the canonical equations are Hamilton's: --formulation hamiltonian")
-    rows = [_unsolved(model, row) for row in rows_of(form, "momentum")]
+    rows = [_momentum_row(model, row) for row in rows_of(form, "momentum")]
     carriers = [row.owner for row in rows]
     if not carriers:
         raise NoSuchEquations("no coordinate carries a momentum: there is no kinetic store")
     flows = [var(owner, "f") for owner in carriers]
+    # moving inertia of many coordinates has no short inverse
     if len(model.solved) > MOVING and any(
         n.op == "var"
         for r in rows
@@ -312,20 +317,22 @@ def canonical(algebra: Algebra, model: EnergyModel, form: DescriptorForm) -> tup
             " --form descriptor has p = dT*/df"
         )
     try:
-        solution = _solved(algebra, rows, flows)
+        solution = _solve_rows(algebra, rows, flows)
     except NoSuchEquations as error:
         raise NoSuchEquations(f"the flows do not follow from the momenta in symbols: {error}") from error
     values = {flow: algebra.node(value) for flow, value in zip(flows, solution, strict=True)}
-    energy = _energy(algebra, model, [owner for owner in carriers if _given(model, owner, "T*")], values)
+    # T and V with flows by momenta: H
+    energy = _energy(algebra, model, [owner for owner in carriers if _reads_flow(model, owner, "T*")], values)
     function = Function("H", tuple(Summed((), t) for t in energy))
-    found = [_rate(algebra, owner, values) for owner in _shown(form)]
+    found = [_rate(algebra, owner, values) for owner in _displacements(form)]
+    # the other rows without flows
     for row in rows_of(form, "dynamics", "phi", "psi", "gamma", "lambda"):
         left, right = sides(row.block, [Summed((), t) for t in _without_flows(algebra, row.expression, values)])
         found.append(Equation(row.block, row.owner, row.place, left, right))
     return function, found
 
 
-def _unsolved(model: EnergyModel, row: Row) -> Row:
+def _momentum_row(model: EnergyModel, row: Row) -> Row:
     """P - dT*/df where the residual solves for the flow."""
     if row.owner not in model.solved:
         return row
@@ -344,7 +351,7 @@ def _energy(
         whole = add(*(t.expression for t in model.function(name)))
         kinetic += sign * _plain(algebra, whole)
     kinetic = _simple(sympy, kinetic.xreplace(flows))
-    potential = joined(algebra, add(*(t.expression for t in model.function("V"))))
+    potential = collect_terms(algebra, add(*(t.expression for t in model.function("V"))))
     return (*_quotient(algebra, kinetic), *potential)
 
 
@@ -353,7 +360,7 @@ def _without_flows(algebra: Algebra, row: Node, values: dict[Node, Node]) -> tup
     flows = {algebra.symbol(flow): algebra.object(value) for flow, value in values.items()}
     found: list[Node] = []
     moved: list[Any] = []
-    for term in joined(algebra, row):
+    for term in collect_terms(algebra, row):
         whole = algebra.object(term)
         if whole.has(*flows):
             moved.append(whole.xreplace(flows))
@@ -363,14 +370,14 @@ def _without_flows(algebra: Algebra, row: Node, values: dict[Node, Node]) -> tup
     return (*found, *(_quotient(algebra, short) if short != 0 else ()))
 
 
-def _given(model: EnergyModel, owner: str, name: str) -> bool:
+def _reads_flow(model: EnergyModel, owner: str, name: str) -> bool:
     """Whether a state function reads the flow of a coordinate."""
     return any(
         n.data[:2] == (owner, "f") for t in model.function(name) for n in variables(t.expression) if n.op == "var"
     )
 
 
-def _shown(form: DescriptorForm) -> list[str]:
+def _displacements(form: DescriptorForm) -> list[str]:
     return [f.owner for f in form.families if f.kind == "q"]
 
 

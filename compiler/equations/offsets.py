@@ -42,10 +42,12 @@ def offsets(form: DescriptorForm) -> Offsets | None:
     place = {name: k for k, name in enumerate(unknowns)}
     names: list[tuple[str, str]] = []
     orders: list[dict[int, int]] = []
+    # q' = f is a row of the structure
     for owner, kind in unknowns:
         if kind == "q":
             names.append(("kinematic", owner))
             orders.append({place[owner, "q"]: 1, place[owner, "f"]: 0})
+    # the highest derivative of each unknown in each row: Pryce's signature matrix
     for row in rows_of(form, *BLOCKS):
         held: dict[int, int] = {}
         for node in variables(row.expression):
@@ -56,7 +58,8 @@ def offsets(form: DescriptorForm) -> Offsets | None:
         orders.append(held)
     if len(orders) != len(unknowns):
         return None
-    c, d = _solved(orders, len(unknowns)) or (None, None)
+    # its canonical offsets; none where it is singular
+    c, d = _canonical_offsets(orders, len(unknowns)) or (None, None)
     if c is None or d is None:
         return None
     found = tuple((*name, int(times)) for name, times in zip(names, c, strict=True) if times)
@@ -64,16 +67,18 @@ def offsets(form: DescriptorForm) -> Offsets | None:
     return Offsets(found, late, max(c, default=0) + bool(late))
 
 
-def _solved(orders: Sequence[dict[int, int]], n: int) -> tuple[list[int], list[int]] | None:
+def _canonical_offsets(orders: Sequence[dict[int, int]], n: int) -> tuple[list[int], list[int]] | None:
     """Offsets of rows and of unknowns."""
     sigma = np.full((n, n), NEVER)
     for i, held in enumerate(orders):
         for j, order in held.items():
             sigma[i, j] = order
+    # a transversal of largest sum
     rows, columns = linear_sum_assignment(sigma, maximize=True)
     if sigma[rows, columns].min(initial=0.0) < 0.0:
         return None
     c = np.zeros(n)
+    # the least c and d that satisfy d_j - c_i >= sigma_ij, equal along it
     while True:
         d = (sigma + c[:, None]).max(axis=0)
         more = d[columns] - sigma[rows, columns]

@@ -18,6 +18,7 @@ class Order:
 
     def rank(self, node: Node) -> tuple[int, int]:
         """The place of a factor: numbers, sums of parameters, parameters, functions, unknowns, rates, multipliers."""
+        # numbers, parameters in the order of their declaration, time and indices
         if node.op == "const":
             return 0, 0
         if node.op == "param":
@@ -26,6 +27,7 @@ class Order:
             return 3, node.number
         if node.op != "var":
             return (4 if variables(node) else 1), node.number
+        # unknowns, their rates, multipliers
         _, kind, order = node.data
         if order:
             return 10, node.number

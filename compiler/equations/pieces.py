@@ -32,10 +32,14 @@ def pieces(form: DescriptorForm, number: int) -> list[Piece]:
 
 
 def _piece(summand: Summand, nest: Nest) -> Piece:
+    """A summand of a row over the row's own indices: where it holds, which of these are fixed, and the loops it sums
+    over.
+    """
     change: dict[Node, Node] = {}
     where: list[Loop] = []
     fixed: list[tuple[int, Node]] = []
     own: set[str] = set()
+    # an index of the row that is a loop variable but for a shift: the loop becomes that index
     for d, at in enumerate(summand.at):
         found = next((loop for loop in nest if _shift(at, loop.index) is not None and loop.index not in own), None)
         shift = None if found is None else _shift(at, found.index)
@@ -45,6 +49,7 @@ def _piece(summand: Summand, nest: Nest) -> Piece:
         own.add(found.index)
         change[index(found.index)] = sub(index(f"#{d}"), shift)
         where.append(Loop(f"#{d}", add(found.first, shift), add(found.last, shift)))
+    # loops that no index of the row follows are sums
     rest = [loop for loop in nest if loop.index not in own]
     for k, loop in enumerate(rest):
         change[index(loop.index)] = index(f"#{len(summand.at) + k}")

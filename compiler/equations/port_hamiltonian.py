@@ -21,11 +21,11 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 
 from sysdyn.compiler.equations.algebra import Algebra
-from sysdyn.compiler.equations.book import Function, gathered
-from sysdyn.compiler.equations.joining import joined, length, ordered, shortest
+from sysdyn.compiler.equations.book import Function, sum_terms
+from sysdyn.compiler.equations.joining import collect_terms, length, shortest, sort_factors
 from sysdyn.compiler.equations.matrices import Matrix, NoSuchEquations
 from sysdyn.compiler.forms.descriptor import DescriptorForm
-from sysdyn.compiler.forms.momenta import given
+from sysdyn.compiler.forms.momenta import coordinates_by_energy
 from sysdyn.compiler.model.energies import EnergyModel, Virtual
 from sysdyn.compiler.model.terms import local_variables, summands
 from sysdyn.dsl.model.calculus import derivative, signals_held
@@ -78,21 +78,21 @@ def written(algebra: Algebra, view: PortHamiltonian) -> tuple[Function, tuple[Ma
     parts = [column("z", view.z), matrix("E", view.mass, n), matrix("J", view.skew, n), matrix("R", view.loss, n)]
     parts += [matrix("G", view.gain, m), column("u", view.u)] if m else []
     parts.append(column("e", view.e))
-    return Function("H", gathered(algebra, [((), view.energy)], whole=True)), tuple(parts)
+    return Function("H", sum_terms(algebra, [((), view.energy)], whole=True)), tuple(parts)
 
 
 def _entry(algebra: Algebra, node: Node) -> tuple[Node, ...]:
     """The terms of an entry in its shortest form."""
     short = shortest(algebra, algebra.object(node))
     parts = algebra.sympy.Add.make_args(short) if short != 0 else ()
-    found = tuple(ordered(algebra, algebra.node(part)) for part in parts)
-    other = joined(algebra, node)  # knows differences of angles
+    found = tuple(sort_factors(algebra, algebra.node(part)) for part in parts)
+    other = collect_terms(algebra, node)  # knows differences of angles
     return other if length(algebra, other) < length(algebra, found) else found
 
 
 def port_hamiltonian(model: EnergyModel, form: DescriptorForm) -> PortHamiltonian:
     """The view in the unknowns of the form: momenta where it carries them, flows elsewhere."""
-    return _View(model, form).made()
+    return _View(model, form).assemble()
 
 
 class _View:
@@ -103,18 +103,20 @@ class _View:
         if any(c.shape for c in model.coordinates):
             raise NoSuchEquations("families over ranges are not written out")
         m = self.m
-        self.stores = given(model)
+        # what carries energy: displacements, momenta or flows
+        self.stores = coordinates_by_energy(model)
         self.carriers = {f.owner for f in form.families if f.kind == m.conjugate} & {c.name for c in model.coordinates}
         names = [c.name for c in model.coordinates]
         kept = {f.owner for f in form.families if f.kind == m.coordinate}
         self.places = [n for n in names if n in kept or self._moves(n)]
         self.names = names
         self.given = {u.name for u in model.unknowns}
-        self.closed = self._closed()
+        self.closed = self._explicit_unknowns()
         self.implicit = [u.name for u in model.unknowns if u.name not in self.closed]
         constraints = [(row.kind, row.name, row.at) for row in model.rows if row.kind in ("phi", "psi")]
         if any(at for _, _, at in constraints):
             raise NoSuchEquations("families over ranges are not written out")
+        # the unknowns z: displacements, momenta or flows, multipliers, implicit efforts
         self.labels = list(dict.fromkeys((kind, name) for kind, name, _ in constraints))
         self.z = [var(n, m.coordinate) for n in self.places]
         self.first = len(self.z)
@@ -131,7 +133,7 @@ class _View:
 
     # -- parts ---------------------------------------------------------------------------------------------------
 
-    def made(self) -> PortHamiltonian:
+    def assemble(self) -> PortHamiltonian:
         """All parts put together."""
         energy = self._energy()
         self._kinetic()
@@ -144,9 +146,9 @@ class _View:
         return PortHamiltonian(
             tuple(self.z),
             e,
-            _summed(self.mass),
-            _summed(self.skew),
-            _summed(self.loss),
+            _sum_entries(self.mass),
+            _sum_entries(self.skew),
+            _sum_entries(self.loss),
             {key: node for key, node in gain.items() if not is_const(node, 0.0)},
             tuple(inputs),
             energy,
@@ -201,10 +203,12 @@ class _View:
     def _kinetic(self) -> None:
         """Q' = f and M f' or p'; the curl of the momenta."""
         m, momenta = self.m, self._momenta()
+        # q' = f: a pair of skew entries
         for name in self.places:
             q, row = self.at[var(name, m.coordinate)], self.first + self.names.index(name)
             _add(self.mass, q, q, const(1.0))
-            self._skewed(q, row, const(1.0))
+            self._add_skew(q, row, const(1.0))
+        # momenta as unknowns have a rate of their own, others M f'
         for i, name in enumerate(self.names):
             if name in self.carriers:
                 _add(self.mass, self.first + i, self.first + i, const(1.0))
@@ -214,12 +218,13 @@ class _View:
                     if other in self.carriers and not is_const(derivative(momenta[name], var(other, m.rate)), 0.0):
                         raise NoSuchEquations(f"{name} has no momentum beside that of {other}")
                     _add(self.mass, self.first + i, self.first + j, derivative(momenta[name], var(other, m.rate)))
+                # the gyroscopic terms of moving inertia
                 if j > i and other not in self.carriers:
                     curl = sub(
                         derivative(momenta.get(other, const(0.0)), var(name, m.coordinate)),
                         derivative(momenta.get(name, const(0.0)), var(other, m.coordinate)),
                     )
-                    self._skewed(self.first + i, self.first + j, curl)
+                    self._add_skew(self.first + i, self.first + j, curl)
 
     def _contents(self) -> None:
         """R22 of D, term by term."""
@@ -228,9 +233,9 @@ class _View:
                 raise NoSuchEquations("sums over ranges are not written out")
             rates = local_variables(term.expression, self.m.rate)
             slopes = [derivative(term.expression, v) for v in rates]
-            self._lost([(n.data[0], s) for n, s in zip(rates, slopes, strict=True)])
+            self._add_dissipation([(n.data[0], s) for n, s in zip(rates, slopes, strict=True)])
 
-    def _lost(self, efforts: Sequence[tuple[str, Node]]) -> None:
+    def _add_dissipation(self, efforts: Sequence[tuple[str, Node]]) -> None:
         """Efforts against flows as a symmetric matrix times the flows."""
         rates = [var(n, self.m.rate) for n, _ in efforts]
         second = [[derivative(s, v) for v in rates] for _, s in efforts]
@@ -257,10 +262,13 @@ class _View:
             on = {n.data[0]: derivative(work.on, n) for n in local_variables(work.on, m.coordinate)}
             for effort in summands(substitute(work.effort, self._explicit())):
                 read = {n for n in variables(effort) if n.op == "var"}
+                # an implicit effort is an unknown
                 if any(n.data[1] == "e" and n.data[0] in self.given for n in read):
                     self._implicit(effort, on, work)
+                # by flows: dissipation or exchange
                 elif any(n.data[1] == m.rate for n in read):
                     self._by_flows(effort, on, linear)
+                # of time and displacements: an input
                 else:
                     for name, slope in on.items():
                         self.gain.setdefault((self._row(name), effort), []).append(slope)
@@ -287,7 +295,7 @@ class _View:
             for b in names[k:]:
                 one, other = matrix[a, b], matrix[b, a]
                 if a != b:
-                    self._skewed(self._row(a), self._row(b), scale(0.5, sub(one, other)))
+                    self._add_skew(self._row(a), self._row(b), scale(0.5, sub(one, other)))
                     _add(self.loss, self._row(b), self._row(a), scale(-0.5, add(one, other)))
                 _add(self.loss, self._row(a), self._row(b), scale(-0.5, add(one, other)))
 
@@ -297,9 +305,9 @@ class _View:
         if len(own) != 1 or own[0] in variables(part):
             raise NoSuchEquations("an effort is no multiple of one implicit effort")
         for name, slope in on.items():
-            self._skewed(self._row(name), self.at[own[0]], mul(part, slope))
+            self._add_skew(self._row(name), self.at[own[0]], mul(part, slope))
 
-    def _closed(self) -> dict[str, Node]:
+    def _explicit_unknowns(self) -> dict[str, Node]:
         """Implicit unknowns that a gamma gives by what is none."""
         found: dict[str, Node] = {}
         for row in self.model.of_kind("gamma"):
@@ -333,6 +341,7 @@ class _View:
             k = self.at[own]
             column = {i: add(*parts) for (i, j), parts in self.skew.items() if j == k}
             found = [g for g in rows if own in variables(g)]
+            # two unknown efforts in one gamma: neither's law alone
             if len(found) != 1 or not column:
                 raise NoSuchEquations(f"no effort constraint is the law of {name} alone")
             gamma = substitute(found[0], self._explicit())
@@ -341,9 +350,11 @@ class _View:
             if others or {self._row(n) for n in slopes} != set(column):
                 raise NoSuchEquations(f"the effort constraint of {name} is no relation to its own flow")
             first = next(iter(slopes))
+            # the multiple of gamma in which the first flow has the coefficient of -B^T f
             factor = neg(div(column[self._row(first)], slopes[first]))
             if any(set(local_variables(s, m.rate)) for s in slopes.values()):
                 raise NoSuchEquations(f"the effort constraint of {name} is not linear in its flow")
+            # what is left without flows, R33 e, is divided by e
             still = {n: const(0.0) for n in local_variables(gamma, m.rate)}
             _add(self.loss, k, k, neg(div(mul(factor, substitute(gamma, still)), own)))
 
@@ -355,6 +366,7 @@ class _View:
                 continue
             k = self.at[var(row.name, "kappa" if row.kind == "phi" else "mu")]
             kind = m.coordinate if row.kind == "phi" else m.rate
+            # the gradient stands in the balance and, against it, in the constraint's rate
             for term in row.terms:
                 if term.loops:
                     raise NoSuchEquations("sums over ranges are not written out")
@@ -362,7 +374,8 @@ class _View:
                 nodes = local_variables(held, kind)
                 for node in nodes:
                     slope = substitute(derivative(held, node), signals)
-                    self._skewed(k, self._row(node.data[0]), slope)
+                    self._add_skew(k, self._row(node.data[0]), slope)
+                # what moves it without flows: an input of the constraint
                 if row.kind == "psi":
                     moving = substitute(term.expression, {n: const(0.0) for n in nodes})
                 else:
@@ -374,7 +387,7 @@ class _View:
     def _row(self, name: str) -> int:
         return self.first + self.names.index(name)
 
-    def _skewed(self, i: int, j: int, value: Node) -> None:
+    def _add_skew(self, i: int, j: int, value: Node) -> None:
         _add(self.skew, i, j, value)
         _add(self.skew, j, i, neg(value))
 
@@ -384,6 +397,6 @@ def _add(entries: Entries, i: int, j: int, value: Node) -> None:
         entries.setdefault((i, j), []).append(value)
 
 
-def _summed(entries: Entries) -> dict[tuple[int, int], Node]:
+def _sum_entries(entries: Entries) -> dict[tuple[int, int], Node]:
     found = {key: add(*parts) for key, parts in entries.items()}
     return {key: node for key, node in found.items() if not is_const(node, 0.0)}

@@ -20,7 +20,7 @@ def with_book_signs(form: DescriptorForm) -> DescriptorForm:
     return replace(form, blocks=blocks, pins=pins)
 
 
-def signed(root: Node) -> Node:
+def negate_conjugates(root: Node) -> Node:
     """The expression with every conjugate's sign changed."""
     change = {}
     for node in ordered_variables(root):
@@ -35,7 +35,7 @@ def _block(block: Block) -> Block:
     defines = HOME.get(block.name, block.name) == "momentum"
     kernels = []
     for kernel in block.kernels:
-        found = ((s, signed(s.expression)) for s in kernel.rows)
+        found = ((s, negate_conjugates(s.expression)) for s in kernel.rows)
         rows = tuple(replace(s, expression=neg(e) if defines else e) for s, e in found)
         kernels.append(replace(kernel, rows=rows))
     return replace(block, kernels=tuple(kernels))

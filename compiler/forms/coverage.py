@@ -27,6 +27,7 @@ def cover(model: EnergyModel, family: Family, *, given: bool) -> Cover | None:
     if len(family.shape) != 1:
         return None
     places = []
+    # a term over the whole range that moves with each element covers the family
     for term in model.function(function):
         for node in local_variables(term.expression, kind):
             if node.data[0] == family.name:

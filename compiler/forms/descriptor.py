@@ -11,7 +11,7 @@ to rows.  Blocks and their meaning: runtime/core/system/model.h.
 from __future__ import annotations
 
 from sysdyn.compiler.model.energies import Offset, over
-from sysdyn.compiler.model.mirror import letter, lettered, spelled, word
+from sysdyn.compiler.model.mirror import family_name, letter, with_family_letters, word
 from sysdyn.compiler.model.terms import Nest
 from sysdyn.dsl.model.expression import Node, topological, variables
 from sysdyn.dsl.model.network import Shape
@@ -179,6 +179,7 @@ def verify_descriptor(form: DescriptorForm) -> None:
 
 
 def _verify_summand(block: str, summand: Summand, bound: set[str], known: set[tuple[str, str]]) -> None:
+    """Assert what the contract says of a summand: known unknowns, bound indices, rates only where they may stand."""
     for node in topological((*summand.at, summand.expression)):
         if node.op == "index":
             assert node.data in bound or node.data.startswith("#r"), (block, node)
@@ -197,8 +198,9 @@ def show(form: DescriptorForm) -> str:
     """The form as text, for --dump descriptor, in the letters of its family."""
     f = form.formulation
     lines = [f"formulation {f}"]
+    # unknowns, rows, blocks, initial values
     for k, u in enumerate(form.families):
-        lines.append(f"unknown {k}: {spelled(f, u.name, u.kind)} ({letter(f, u.kind)}, {u.unit})")
+        lines.append(f"unknown {k}: {family_name(f, u.name, u.kind)} ({letter(f, u.kind)}, {u.unit})")
     for k, r in enumerate(form.rows):
         line = f" line {r.place.start[0]}" if r.place else ""
         lines.append(f"row {k}: {word(f, r.kind)} of {r.label}{line}")
@@ -207,11 +209,11 @@ def show(form: DescriptorForm) -> str:
         for kernel in block.kernels:
             for s in kernel.rows:
                 at = f"[{', '.join(map(repr, s.at))}]" if s.at else ""
-                own = lettered(f, s.expression)
+                own = with_family_letters(f, s.expression)
                 lines.append(f"  {over(kernel.nest)}{form.rows[s.row].label}{at} += {own!r}")
     for pin in form.pins:
         sign = "=" if pin.fixed else "~"
         at = f"[{', '.join(map(repr, pin.at))}]" if pin.at else ""
         of = form.families[pin.family]
-        lines.append(f"init {over(pin.nest)}{spelled(f, of.name, of.kind)}{at} {sign} {pin.value!r}")
+        lines.append(f"init {over(pin.nest)}{family_name(f, of.name, of.kind)}{at} {sign} {pin.value!r}")
     return "\n".join(lines) + "\n"

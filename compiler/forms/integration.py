@@ -34,26 +34,29 @@ def integrate(model: EnergyModel) -> tuple[EnergyModel, tuple[Diagnostic, ...]]:
     """The model with integrable psi rows as phi, and a note N501 for each."""
     tangible = frozenset(c.name for c in model.coordinates if c.tangible)
     labels: dict[str, list[Row]] = {}
+    # rows of one label are integrated together or not at all
     for row in model.of_kind("psi"):
         if row.name in model.switched:
             continue  # a displacement goes on from where its flow was let go
         labels.setdefault(row.name, []).append(row)
+    # exact, and tied to what the author calls tangible
     chosen = {n for n, rows in labels.items() if _touches(rows, tangible, model.mirror) and _all_exact(rows, model)}
     if not chosen:
         return model, ()
     offsets: list[Offset] = []
     notes: list[Diagnostic] = []
     rows: list[Row] = []
+    # the row becomes a phi with a constant; a term that adds to one has none of its own
     for row in model.rows:
         if row.kind == "psi" and row.name in chosen:
-            integrated, offset = _integrated(row, model.mirror)
+            integrated, offset = _integrate_row(row, model.mirror)
             rows.append(integrated)
             offsets.append(offset)
             if not row.adds:
                 notes.append(_note(row, labels[row.name], offset, tangible, model.mirror))
         else:
             rows.append(row)
-    return _renamed(replace(model, rows=tuple(rows), offsets=tuple(offsets)), chosen), tuple(notes)
+    return _rename_multipliers(replace(model, rows=tuple(rows), offsets=tuple(offsets)), chosen), tuple(notes)
 
 
 def _touches(rows: list[Row], tangible: frozenset[str], mirror: Mirror) -> bool:
@@ -84,7 +87,7 @@ def _primitive(expression: Node, mirror: Mirror) -> Node:
     return add(*parts, mul(free, time()))
 
 
-def _integrated(row: Row, mirror: Mirror) -> tuple[Row, Offset]:
+def _integrate_row(row: Row, mirror: Mirror) -> tuple[Row, Offset]:
     name = f"#offset {row.name}"
     terms = tuple(Term(_primitive(t.expression, mirror), t.loops, t.place) for t in row.terms)
     constant = () if row.adds else (Term(neg(param(name, *row.at)), row.nest, row.place),)
@@ -120,7 +123,7 @@ def _at_start(expression: Node, mirror: Mirror) -> str:
     return to_text(substitute(expression, {**marks, time(): const(0.0)}))
 
 
-def _renamed(model: EnergyModel, labels: set[str]) -> EnergyModel:
+def _rename_multipliers(model: EnergyModel, labels: set[str]) -> EnergyModel:
     """Multipliers mu of the labels written as kappa everywhere."""
 
     def new(root: Node) -> Node:

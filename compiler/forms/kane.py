@@ -41,7 +41,7 @@ class Projection:
     bound: frozenset[str]
 
     def along(self, speeds: Speeds) -> Projection:
-        """The same with partial velocities in the place of the columns of their coordinates."""
+        """The projection with partial velocities in the place of the columns of their coordinates."""
         free = {name: column for name, column in self.free.items() if name not in speeds.rest}
         bound = self.bound - set(speeds.rest)
         return Projection({**free, **{u: dict(c) for u, c in speeds.columns.items()}}, bound)
@@ -50,7 +50,7 @@ class Projection:
 def kane(model: EnergyModel) -> DescriptorForm:
     """Unknowns q f kappa e s, and mu where it is kept.  ModelError E607 where the rows of Psi depend on each other."""
     (rows, joining), form = constraints(model), lagrangian(model)
-    read = _joined(rows, _reactions_read(form) | joining)
+    read = _coupled_labels(rows, _reactions_read(form) | joining)
     found = projection(model, {label: entries for label, entries in rows.items() if label not in read})
     speeds = speeds_of(model, read)
     if speeds.speeds:
@@ -93,6 +93,7 @@ def projection(model: EnergyModel, rows: Mapping[str, Entries]) -> Projection:
     """B of these flow constraints: pivots that are numbers first, by division; of the others by minors."""
     reduced = {name: dict(entries) for name, entries in rows.items()}
     pivots: dict[str, str] = {}
+    # division by numbers first: no case in which it fails
     while len(pivots) < len(rows):
         name, column = _pivot(reduced, pivots, model)
         if not is_const(reduced[name][column]):
@@ -101,11 +102,13 @@ def projection(model: EnergyModel, rows: Mapping[str, Entries]) -> Projection:
         _eliminate(reduced, name, column)
     free: dict[str, Entries] = {}
     bound = set(pivots.values())
+    # what is left in parts that share flows, by minors
     for part in _parts({name: entries for name, entries in reduced.items() if name not in pivots}):
         own, columns = _free(part, model)
         bound |= own
         free |= columns
     free = {c.name: free.get(c.name, {c.name: const(1.0)}) for c in model.coordinates if c.name not in bound}
+    # the motion of the coordinates that were divided for
     for name, column in pivots.items():
         entries = reduced[name]
         for motion in free.values():
@@ -133,11 +136,13 @@ def _free(part: Mapping[str, Entries], model: EnergyModel) -> tuple[set[str], di
     """
     reduced = {name: dict(entries) for name, entries in part.items()}
     pivots: dict[str, str] = {}
+    # pivots tell which coordinates are bound
     for _ in part:
         name, column = _pivot(reduced, pivots, model)
         pivots[name] = column
         _eliminate(reduced, name, column)
     bound, free = list(pivots.values()), dict.fromkeys(c for e in part.values() for c in e if c not in pivots.values())
+    # determinants of many rows grow too long: columns by elimination
     if len(part) > LARGEST:
         return set(bound), {name: _column(name, reduced, pivots) for name in free}
     columns = {c: [entries.get(c, const(0.0)) for entries in part.values()] for c in (*bound, *free)}
@@ -146,6 +151,7 @@ def _free(part: Mapping[str, Entries], model: EnergyModel) -> tuple[set[str], di
         return determinant([list(row) for row in zip(*columns, strict=True)])
 
     motions: dict[str, Entries] = {}
+    # Cramer's rule without the division
     for name in free:
         motions[name] = {name: whole([columns[c] for c in bound])}
         for k, other in enumerate(bound):
@@ -240,11 +246,11 @@ def _reactions_read(form: DescriptorForm) -> frozenset[str]:
     return frozenset(read | {f.owner for f in pinned if f.kind == "mu"})
 
 
-def _joined(rows: Mapping[str, Entries], read: frozenset[str]) -> frozenset[str]:
+def _coupled_labels(rows: Mapping[str, Entries], read: frozenset[str]) -> frozenset[str]:
     """These labels, and all whose rows share flows with them."""
     columns = {c for label in read for c in rows[label]}
     more = frozenset(label for label, entries in rows.items() if columns & set(entries))
-    return read if more <= read else _joined(rows, read | more)
+    return read if more <= read else _coupled_labels(rows, read | more)
 
 
 class _Projected:
@@ -255,9 +261,9 @@ class _Projected:
         self.flows = {var(n, "f"): speeds.flow(n) for n in speeds.rest}
         self.change = {var(n, "f", order=1): total_rate(speeds.flow(n)) for n in speeds.rest}
         self.assembly = Assembly()
-        self.rated = self._rated()
+        self.rated = self._massless_coordinates()
 
-    def _rated(self) -> frozenset[str]:
+    def _massless_coordinates(self) -> frozenset[str]:
         """Coordinates whose mixed balances are algebraic (see `lowering`), with their rates."""
         block = self.lagrange.block("dynamics_rate")
         rows = {s.row for kernel in block.kernels for s in kernel.rows} if block else set()
@@ -266,12 +272,14 @@ class _Projected:
 
     def form(self) -> DescriptorForm:
         """The projected form."""
+        # balances of bound coordinates go, those of given speeds become kinematic
         for row in self.lagrange.rows:
             if row.block == "dynamics" and row.owner in self.speeds.rest:
                 unit = next(f.unit for f in self.lagrange.families if (f.owner, f.kind) == (row.owner, "f"))
                 self.assembly.family(replace(row, unit=unit, kind="kinematic"))
             elif (row.block != "dynamics" or row.owner not in self.found.bound) and not self._left_out(row):
                 self.assembly.family(row)
+        # a balance along each speed
         for speed in self.speeds.speeds:
             unit = f"W/({speed.unit})"
             self.assembly.family(Equations("dynamics", speed.name, speed.name, "dynamics", unit, speed.place))
@@ -280,10 +288,12 @@ class _Projected:
                 if row.block == "dynamics":
                     self.assembly.family(replace(row, block="phi_normal", kind="phi_normal"))
         self._copy()
+        # coordinates whose flow the speeds give
         for name in self.speeds.rest:
             zero = kinematics(self.speeds, name)
             self.assembly.add("dynamics", name, (), (), zero)
             self.assembly.add("dynamics_rate", name, (), (), total_rate(zero))
+        # multipliers of flow constraints are gone, unless something reads them
         kept = [f for f in self.lagrange.families if f.kind != "mu" or f.owner in self.read]
         last = 1 + max(k for k, f in enumerate(kept) if f.kind == "f") if self.speeds.speeds else 0
         own = [Unknowns(s.name, "f", s.name, s.unit, s.place) for s in self.speeds.speeds]
@@ -318,6 +328,7 @@ class _Projected:
         return any(n.data[0] in self.read for n in local_variables(reaction, "mu"))
 
     def _copy(self) -> None:
+        """Add all rows of Lagrange's form, balances projected on the free motions, without what projection removes."""
         for block in self.lagrange.blocks:
             if block.name == "dynamics_rate":
                 continue
@@ -327,9 +338,11 @@ class _Projected:
                     value = substitute(summand.expression, self.change) if self.change else summand.expression
                     if self._left_out(row) or (block.name == "psi_reaction" and not self._is_read(value)):
                         continue
+                    # no balance: as it is
                     if HOME.get(block.name, block.name) != "dynamics":
                         self.assembly.add(block.name, row.owner, summand.at, kernel.nest, value)
                         continue
+                    # reactions of displacement constraints do not vanish under the projection of flows
                     if block.name == "phi_reaction":
                         self.assembly.add("phi_normal", row.owner, summand.at, kernel.nest, value)
                     self._balance(block.name, row.owner, summand.at, kernel.nest, value)

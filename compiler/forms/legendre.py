@@ -68,7 +68,7 @@ class _Block:
     terms: tuple[int, ...]
 
 
-def transformed(model: EnergyModel, parameters: Sequence[Parameter]) -> tuple[EnergyModel, tuple[Slope, ...]]:
+def legendre_transform(model: EnergyModel, parameters: Sequence[Parameter]) -> tuple[EnergyModel, tuple[Slope, ...]]:
     """The model with T(p, q) for the blocks of T* that allow it; the determinants that must not become zero."""
     m = model.mirror
     terms = model.function(m.coenergy)
@@ -76,15 +76,18 @@ def transformed(model: EnergyModel, parameters: Sequence[Parameter]) -> tuple[En
     found: list[Term] = []
     rests: list[Slope] = []
     solved: dict[str, tuple[Node, Node]] = {}
+    # blocks of T* that share no flow are transformed one by one
     for block in _blocks(terms, m.rate):
         whole = add(*(terms[k].expression for k in block.terms))
-        inertia = _inertia(whole, block.flows, _known(parameters))
+        inertia = _inertia(whole, block.flows, _scalar_values(parameters))
+        # not a regular quadratic form of numbers and displacements
         if inertia is None:
             continue
         place = terms[block.terms[0]].place
         momenta = _momenta(whole, block.flows, m.conjugate)
-        if len(inertia) > WRITTEN and not _apart(inertia):
-            solved |= _solved(whole, block.flows, inertia, momenta, m.conjugate)
+        # a full matrix: flows by relations in place of an inverse
+        if len(inertia) > WRITTEN and not _is_diagonal(inertia):
+            solved |= _flow_relations(whole, block.flows, inertia, momenta, m.conjugate)
         else:
             gone |= set(block.terms)
             found += [Term(part, (), place) for part in _energy(whole, block.flows, inertia, momenta)]
@@ -98,8 +101,8 @@ def transformed(model: EnergyModel, parameters: Sequence[Parameter]) -> tuple[En
 
 def _rest_on(inertia: Square, flows: Sequence[Node]) -> Iterator[tuple[Node, Node]]:
     """A flow and what of parameters must not be zero, for M to have an inverse; at one point where M moves."""
-    apart = _apart(inertia)
-    sizes = [row[k] for k, row in enumerate(inertia)] if apart else _eliminated(inertia)[1]
+    apart = _is_diagonal(inertia)
+    sizes = [row[k] for k, row in enumerate(inertia)] if apart else _factor_inertia(inertia)[1]
     drawn = random.Random(0)
     at: dict[Node, Node] = {}
     for node in topological(sizes):
@@ -117,12 +120,14 @@ def _blocks(terms: Sequence[Term], rate: str) -> Iterator[_Block]:
     lost: set[str] = set()
     for k, term in enumerate(terms):
         flows = dict.fromkeys(local_variables(term.expression, rate))
+        # arrays keep their coenergy
         if term.loops or any(n.args for n in flows):
             lost |= {n.data[0] for n in flows}
             continue
         if not flows:
             continue
         own, numbers, apart = flows, [k], []
+        # union of the parts that the term joins
         for part in parts:
             if part[0].keys() & own.keys():
                 own, numbers = {**part[0], **own}, part[1] + numbers
@@ -143,7 +148,7 @@ def _inertia(whole: Node, flows: Sequence[Node], known: Values) -> list[list[Nod
     for entry in (e for row in inertia for e in row):
         if any(n in rates or (n.op == "var" and n.data[1] not in ("q", "p", "s")) for n in variables(entry)):
             return None
-    if not _apart(inertia) and len(flows) > COUPLED:
+    if not _is_diagonal(inertia) and len(flows) > COUPLED:
         return None
     return inertia if _regular(inertia, known) else None
 
@@ -172,7 +177,7 @@ def _form(inertia: Square, momenta: Sequence[Node]) -> list[Node]:
     return found
 
 
-def _solved(
+def _flow_relations(
     whole: Node, flows: Sequence[Node], inertia: Square, momenta: Sequence[Node], conjugate: str
 ) -> dict[str, tuple[Node, Node]]:
     """By coordinate 0 = dT/dp - f, and the rate of this where it holds: M^-1 (p' - (dT*/df)')."""
@@ -183,7 +188,7 @@ def _solved(
 
 def _flows(inertia: Square, momenta: Sequence[Node]) -> list[Node]:
     """M^-1 z, by elimination."""
-    lower, pivots = _eliminated(inertia)
+    lower, pivots = _factor_inertia(inertia)
     y: list[Node] = []
     for k, z in enumerate(momenta):
         y.append(sub(z, add(*(mul(lower[k][j], y[j]) for j in range(k)))))
@@ -194,7 +199,7 @@ def _flows(inertia: Square, momenta: Sequence[Node]) -> list[Node]:
     return found[::-1]
 
 
-def _eliminated(inertia: Square) -> tuple[list[list[Node]], list[Node]]:
+def _factor_inertia(inertia: Square) -> tuple[list[list[Node]], list[Node]]:
     """The rows of L and the pivots of M = L D L^T."""
     lower: list[list[Node]] = []
     pivots: list[Node] = []
@@ -209,13 +214,13 @@ def _eliminated(inertia: Square) -> tuple[list[list[Node]], list[Node]]:
 
 
 def _inverse(inertia: Square) -> list[list[Node]]:
-    if not _apart(inertia):
+    if not _is_diagonal(inertia):
         return inverse(inertia)
     zero = const(0.0)
     return [[power(e, const(-1.0)) if j == k else zero for k, e in enumerate(row)] for j, row in enumerate(inertia)]
 
 
-def _apart(inertia: Square) -> bool:
+def _is_diagonal(inertia: Square) -> bool:
     """Whether M is diagonal."""
     return all(is_const(e, 0.0) for j, row in enumerate(inertia) for k, e in enumerate(row) if j != k)
 
@@ -223,8 +228,9 @@ def _apart(inertia: Square) -> bool:
 def _regular(inertia: Square, known: Values) -> bool:
     """Whether no pivot of M is nearly zero at some points; of those far out, only where M has values there."""
     entries = [e for row in inertia for e in row]
-    pivots = [row[k] for k, row in enumerate(inertia)] if _apart(inertia) else _eliminated(inertia)[1]
+    pivots = [row[k] for k, row in enumerate(inertia)] if _is_diagonal(inertia) else _factor_inertia(inertia)[1]
     n = len(pivots)
+    # by samples: half of them near, half far out
     for seed in range(DRAWN):
         drawn = random.Random(seed)
         ends = NEAR if seed % 2 == 0 else (-WIDE, WIDE)
@@ -243,13 +249,14 @@ def _regular(inertia: Square, known: Values) -> bool:
             found = [math.nan] * (n + n * n)
         if ends is not NEAR and any(math.isnan(v) for v in found[n:]):
             continue
+        # each pivot against the largest entry of its row
         rows = [max(abs(v) for v in found[(k + 1) * n : (k + 2) * n]) for k in range(n)]
         if not all(abs(d) > SINGULAR * row > 0.0 for d, row in zip(found, rows, strict=False)):
             return False
     return True
 
 
-def _known(parameters: Sequence[Parameter]) -> Values:
+def _scalar_values(parameters: Sequence[Parameter]) -> Values:
     """Values of scalar parameters by name; of others 1."""
     said = {p.name: p.values[0] for p in parameters if not p.shape and len(p.values) == 1}
     found: dict[str, float] = {}

@@ -24,15 +24,21 @@ from sysdyn.compiler.forms.meters.audit import add_audit
 from sysdyn.compiler.forms.meters.observing import (
     add_initials,
     add_observations,
-    begun,
+    displacement_unknowns,
     missing,
-    observed,
+    observed_coordinates,
     pins_and_equations,
 )
-from sysdyn.compiler.forms.momenta import given, inertial, jumping, resolved, shared
+from sysdyn.compiler.forms.momenta import (
+    coordinates_by_energy,
+    coordinates_of_shared_inertia,
+    inertial,
+    jumping,
+    resolve_momenta,
+)
 from sysdyn.compiler.model.energies import EnergyModel, Family, Row
 from sysdyn.compiler.model.terms import Nest, counter, local_variables
-from sysdyn.dsl.model.calculus import derivative, differential, gradient, moved, moving, time_derivative
+from sysdyn.dsl.model.calculus import derivative, differential, gradient, moving, parameter_rates, time_derivative
 from sysdyn.dsl.model.calculus import rate as rate_of
 from sysdyn.dsl.model.evaluation import evaluate
 from sysdyn.dsl.model.expression import Node, add, is_const, neg, ordered_variables, substitute, var, variables
@@ -50,28 +56,34 @@ def lower(model: EnergyModel, formulation: str, *, legendre: bool) -> Descriptor
     """The descriptor form; `legendre`: every inertial coordinate carries its momentum as an unknown, else those alone
     whose inertia jumps.
     """
-    stores = given(model)
+    stores = coordinates_by_energy(model)
     carriers = stores | (inertial(model) if legendre else jumping(model))
-    model = resolved(model, frozenset(carriers))
+    model = resolve_momenta(model, frozenset(carriers))
     form = _Lowering(model, stores, frozenset(carriers))
+    # rows are declared in the order of the contract, whoever adds to them
     form.declare()
     form.kinetic()
+    # efforts on each coordinate
     acting = tuple(efforts(model))
     form.efforts(acting)
     form.constraints()
+    # what is read of the run
     add_observations(form.assembly, model, form.carriers)
     stored = add_audit(form.assembly, model, acting)
+    # initial values of unknowns, and those of expressions as equations of the start
     pins, equations = pins_and_equations(model, form.carriers, form.families)
     add_initials(form.assembly, model, form.carriers, equations)
     form.families += missing(equations)
+    # a start that moves flows moves their momenta together
     if equations or form.moves_flows():
         measured = {n.data[0] for i in model.initials if i.store for n in variables(i.target) if n.op == "var"}
-        form.held(shared(model) - carriers - measured)
+        form.add_momentum_rows(coordinates_of_shared_inertia(model) - carriers - measured)
     owners = (*model.coordinates, *model.unknowns, *model.states, *model.positions)
     shapes = [(f.name, f.shape) for f in owners]
     shapes += [(e.owner, loop_ranges(e.target.nest)) for e in equations]
     shapes += [(HELD + c.name, c.shape) for c in model.coordinates]
     shapes += stored
+    # the elements that the rows of one label cover
     hulls: dict[str, list[tuple[tuple[Node, ...], Nest, Place]]] = {}
     for row in model.rows:
         if row.kind != "lambda" and not row.adds:
@@ -160,7 +172,7 @@ def _speeds(model: EnergyModel) -> dict[str, tuple[tuple[Node, ...], Node]]:
 def total_rate(root: Node) -> Node:
     """Total derivative by t, the derivatives of multipliers among its variables."""
     seeds = {n: rate_of(n) or var(*n.data[:2], *n.args, order=1) for n in ordered_variables(root)}
-    return differential(root, moved(root) | seeds)
+    return differential(root, parameter_rates(root) | seeds)
 
 
 class _Lowering:
@@ -177,11 +189,16 @@ class _Lowering:
         self.families = self._families()
 
     def _families(self) -> list[Unknowns]:
+        """Unknowns in the order of the contract: displacements, flows, momenta, states, implicit efforts, multipliers,
+        audits.
+        """
         m = self.model
         # an integrated psi makes nothing tangible, but its displacements are variables
         pieces = [t.expression for row in m.of_kind("phi") for t in row.terms]
         held = {n.data[0] for piece in pieces for n in local_variables(piece, m.mirror.coordinate)}
-        seen = begun(m, observed(m, self.carriers) | held | {c.name for c in m.coordinates if c.tangible})
+        seen = displacement_unknowns(
+            m, observed_coordinates(m, self.carriers) | held | {c.name for c in m.coordinates if c.tangible}
+        )
         found = [Unknowns(c.shown, "q", c.name, c.units["q"], c.place) for c in m.coordinates if c.name in seen]
         rates = [f"({c.shown})'" if c.less else f"{c.name}'" for c in m.coordinates]
         found += [Unknowns(r, "f", c.name, c.units["f"], c.place) for c, r in zip(m.coordinates, rates, strict=True)]
@@ -209,6 +226,7 @@ class _Lowering:
     def declare(self) -> None:
         """All row families, in the order of the contract."""
         declare = self.assembly.family
+        # balances, momenta, constraints, rates of states
         for c in self.model.coordinates:
             declare(Equations("dynamics", c.name, c.name, "dynamics", c.units["e"], c.place))
         for c in self.model.coordinates:
@@ -237,6 +255,7 @@ class _Lowering:
         for family in self.model.coordinates:
             if family.name in self.carriers:
                 self._carrier(family)
+        # p = dT*/df as a row, or its rate in the balance
         for term in self.model.function(mirror.coenergy):
             for rate in local_variables(term.expression, mirror.rate):
                 if rate.data[0] in self.model.solved:
@@ -246,6 +265,7 @@ class _Lowering:
                     self._momentum(rate.data[0], rate.args, term.loops, neg(slope))
                 else:
                     add("dynamics", rate.data[0], rate.args, term.loops, time_derivative(slope))
+        # f = dT/dp where the author gave T
         for term in self.model.function(mirror.energy):
             for p in local_variables(term.expression, mirror.conjugate):
                 self._momentum(p.data[0], p.args, term.loops, derivative(term.expression, p))
@@ -261,14 +281,17 @@ class _Lowering:
             moved = inside(name)
         self.assembly.add("dynamics", name, at, moved, var(name, m.conjugate, *at, order=1))
         held = var(name, m.conjugate, *at)
+        # 0 = dT/dp - f and its rate are given: nothing is added to them
         if name in self.model.solved:
             zero, rate = self.model.solved[name]
             self.assembly.add("momentum", name, at, nest, zero)
             self.assembly.add("momentum_rate", name, at, nest, rate)
             return
+        # p, to which the other terms of the row come
         if not given:
             self._momentum(name, at, nest, held)
             return
+        # -f where T(p) is given, p at the other elements
         self._momentum(name, at, moved, neg(var(name, m.rate, *at)))
         for rest in outside(family) if partly is not None else ():
             self._momentum(name, at, rest, held)
@@ -286,11 +309,12 @@ class _Lowering:
         one = any(_of_one_combination(energy, rates) for energy, rates in inertias)
         return one or any(row.kind != "lambda" for row in self.model.rows)
 
-    def held(self, names: frozenset[str]) -> None:
+    def add_momentum_rows(self, names: frozenset[str]) -> None:
         """The least change of these flows is that of the momenta which they make together: what they miss of zero, at
         the start alone, as momenta that are unknowns change there.
         """
         m = self.model.mirror
+        # a row and an unknown for what the momentum misses
         for c in self.model.coordinates:
             if c.name in names:
                 owner, (nest, at) = HELD + c.name, whole(c)
@@ -298,6 +322,7 @@ class _Lowering:
                 rows = Equations("initial", c.name, owner, "initial", c.units["p"], c.place, content=True)
                 self.assembly.family(rows)
                 self.assembly.add("initial", owner, at, nest, neg(var(owner, "unsaid", *at)))
+        # dT*/df of each
         for term in self.model.function(m.coenergy):
             for rate in local_variables(term.expression, m.rate):
                 if rate.data[0] in names:

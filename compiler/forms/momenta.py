@@ -32,18 +32,20 @@ JUMPING = ("step", "sign", "setsign", "floor", "ceil", "mod", "frac")
 """Functions whose values jump."""
 
 
-def given(model: EnergyModel) -> frozenset[str]:
+def coordinates_by_energy(model: EnergyModel) -> frozenset[str]:
     """Coordinates whose store the author gave by its energy T(p)."""
     kind = model.mirror.conjugate
     pieces = model.function(model.mirror.energy)
     return frozenset(n.data[0] for t in pieces for n in local_variables(t.expression, kind))
 
 
-def moved(model: EnergyModel) -> frozenset[str]:
+def coordinates_with_inertia(model: EnergyModel) -> frozenset[str]:
     """Coordinates that some kinetic store moves with."""
     rate = model.mirror.rate
     pieces = model.function(model.mirror.coenergy)
-    return given(model) | frozenset(n.data[0] for t in pieces for n in local_variables(t.expression, rate))
+    return coordinates_by_energy(model) | frozenset(
+        n.data[0] for t in pieces for n in local_variables(t.expression, rate)
+    )
 
 
 def _inertia(model: EnergyModel) -> Iterator[tuple[Node, Node, list[Node]]]:
@@ -60,7 +62,7 @@ def inertial(model: EnergyModel) -> frozenset[str]:
     return frozenset(a.data[0] for a, _, others in _inertia(model) if others)
 
 
-def shared(model: EnergyModel) -> frozenset[str]:
+def coordinates_of_shared_inertia(model: EnergyModel) -> frozenset[str]:
     """Coordinates whose momentum dT*/df other flows make too."""
     return frozenset(a.data[0] for a, _, others in _inertia(model) if any(b is not a for b in others))
 
@@ -126,7 +128,7 @@ def resolve(model: EnergyModel, carriers: frozenset[str], root: Node) -> Node:
     return substitute(root, change) if change else root
 
 
-def resolved(model: EnergyModel, carriers: frozenset[str]) -> EnergyModel:
+def resolve_momenta(model: EnergyModel, carriers: frozenset[str]) -> EnergyModel:
     """The model with momenta that are no unknowns replaced in works and rows, whose terms are split again."""
 
     def terms(found: tuple[Term, ...], what: str) -> tuple[Term, ...]:
@@ -145,7 +147,7 @@ def resolved(model: EnergyModel, carriers: frozenset[str]) -> EnergyModel:
     return replace(model, works=tuple(works), rows=rows)
 
 
-def undefined(model: EnergyModel, carriers: frozenset[str], root: Node) -> Iterator[str]:
+def undefined_momenta(model: EnergyModel, carriers: frozenset[str], root: Node) -> Iterator[str]:
     """Coordinates whose momentum is asked for although no kinetic store moves with them (E606)."""
     for node in local_variables(root, model.mirror.conjugate, None):
         if node.data[0] not in carriers and is_const(momentum(model, node), 0.0):

@@ -18,7 +18,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import replace
 
-from sysdyn.compiler.forms.momenta import moved
+from sysdyn.compiler.forms.momenta import coordinates_with_inertia
 from sysdyn.compiler.model.energies import EnergyModel, Family, reading, tangible
 from sysdyn.compiler.model.terms import Nest, has_reduction, local_variables, vanishes
 from sysdyn.dsl.model.calculus import derivative, differential
@@ -47,7 +47,7 @@ class _Anchor:
     name: str
     places: tuple[tuple[int | None, Node], ...]
 
-    def at(self, args: tuple[Node, ...]) -> tuple[Node, ...]:
+    def anchor_indices(self, args: tuple[Node, ...]) -> tuple[Node, ...]:
         """The anchor's indices for an element of the family."""
         return tuple(c if k is None else add(args[k], c) for k, c in self.places)
 
@@ -59,7 +59,7 @@ _Anchors = Mapping[str, _Anchor]
 def in_relative_coordinates(model: EnergyModel) -> EnergyModel:
     """The model with every group that inertia alone joins counted from one of it: its rows have no hidden rate then."""
     m = model.mirror
-    return _counted(model, m.coenergy, m.rate, _floats)
+    return _measure_from_anchors(model, m.coenergy, m.rate, _floats)
 
 
 def without_ignorable(model: EnergyModel) -> EnergyModel:
@@ -67,10 +67,10 @@ def without_ignorable(model: EnergyModel) -> EnergyModel:
     reads the rows.
     """
     m = model.mirror
-    return _counted(model, m.potential, m.coordinate, _is_ignorable)
+    return _measure_from_anchors(model, m.potential, m.coordinate, _is_ignorable)
 
 
-def _counted(
+def _measure_from_anchors(
     model: EnergyModel, function: str, kind: str, admits: Callable[[EnergyModel, _Anchors], bool]
 ) -> EnergyModel:
     """The model with the groups that a state function joins, by its variables of a kind, counted from one of each."""
@@ -79,7 +79,7 @@ def _counted(
         found = (_anchors(model, function, kind, group, anchor) for anchor in _candidates(model, group, kind))
         anchors = next((a for a in found if a and admits(model, a)), {})
         change |= {name: a for name, a in anchors.items() if name != a.name}
-    return _changed(model, change) if change else model
+    return _substitute_relative(model, change) if change else model
 
 
 def _groups(model: EnergyModel, function: str, kind: str) -> Iterator[list[Family]]:
@@ -100,7 +100,7 @@ def _candidates(model: EnergyModel, group: list[Family], kind: str) -> list[Fami
     """
     if kind == model.mirror.rate:
         return [min(reversed(group), key=lambda c: len(c.shape))]
-    inertial = moved(model)
+    inertial = coordinates_with_inertia(model)
     heavy = [c for c in group if c.name in inertial]
     return heavy if len(heavy) == 1 else [] if heavy else sorted(group, key=lambda c: -len(c.shape))
 
@@ -110,6 +110,7 @@ def _anchors(model: EnergyModel, function: str, kind: str, group: list[Family], 
     found = {anchor.name: _Anchor(anchor.name, tuple((k, const(0.0)) for k in range(len(anchor.shape))))}
     shapes = {c.name: c for c in group}
     joined = [local_variables(t.expression, kind) for t in model.function(function)]
+    # spread from the anchor along terms that join families
     while len(found) < len(group):
         before = len(found)
         for nodes in joined:
@@ -117,10 +118,12 @@ def _anchors(model: EnergyModel, function: str, kind: str, group: list[Family], 
             for n in nodes if known is not None else ():
                 if n.data[0] in shapes and n.data[0] not in found:
                     assert known is not None
-                    places = _places(found[known.data[0]].at(known.args), n.args)
+                    places = _places(found[known.data[0]].anchor_indices(known.args), n.args)
+                    # indices that are not those of the anchor but for a shift
                     if places is None or not _inside(shapes[n.data[0]], anchor, places):
                         return {}
                     found[n.data[0]] = _Anchor(anchor.name, places)
+        # a family that no term joins to the anchor
         if len(found) == before:
             return {}
     return found
@@ -160,10 +163,13 @@ def _floats(model: EnergyModel, group: _Anchors) -> bool:
     along = _Along(model, m.coenergy, m.rate, group)
     rows = [row for row in model.rows if row.kind != "lambda"]
     terms = [*model.function(m.coenergy), *model.function(m.content), *(t for row in rows for t in row.terms)]
+    # kinetic coenergy, content or rows change when all flows of the group grow by one number
     if any(along.changes(t.expression, t.loops, m.rate) for t in terms):
         return False
+    # a phi reads one displacement by itself, as q - 1 = 0
     if any(along.changes(t.expression, t.loops, m.coordinate) for row in model.of_kind("phi") for t in row.terms):
         return False
+    # so does the work of an effort that is neither of q alone nor of entropies
     for work in model.works:
         read = {n.data[1:] for n in variables(work.effort) if n.op == "var"}
         if not read <= {(m.coordinate, 0), ("s", 0)} and along.changes(work.on, work.loops, m.coordinate):
@@ -220,7 +226,7 @@ class _Along:
     def __init__(self, model: EnergyModel, function: str, kind: str, group: _Anchors) -> None:
         self.group = group
         self.reached = [
-            _reach(group[n.data[0]].at(n.args), term.loops)
+            _reach(group[n.data[0]].anchor_indices(n.args), term.loops)
             for term in model.function(function)
             for n in local_variables(term.expression, kind)
             if n.data[0] in group
@@ -231,7 +237,7 @@ class _Along:
         together: dict[tuple[Node, ...], dict[Node, Node]] = {}
         for n in local_variables(root, kind):
             if n.data[0] in self.group:
-                together.setdefault(self.group[n.data[0]].at(n.args), {})[n] = const(1.0)
+                together.setdefault(self.group[n.data[0]].anchor_indices(n.args), {})[n] = const(1.0)
         if together and has_reduction(root):
             return True
         return any(
@@ -253,7 +259,7 @@ def _meet(a: tuple[tuple[Node, Node], ...], b: tuple[tuple[Node, Node], ...]) ->
     return not any(is_const(gap) and gap.data > 0.0 for gap in apart)
 
 
-def _changed(model: EnergyModel, change: _Anchors) -> EnergyModel:
+def _substitute_relative(model: EnergyModel, change: _Anchors) -> EnergyModel:
     """Every variable of u_k as u_k + q_r."""
 
     def new(root: Node) -> Node:
@@ -261,7 +267,7 @@ def _changed(model: EnergyModel, change: _Anchors) -> EnergyModel:
         pairs = {}
         for n in found:
             anchor = change[n.data[0]]
-            pairs[n] = add(n, var(anchor.name, n.data[1], *anchor.at(n.args), order=n.data[2]))
+            pairs[n] = add(n, var(anchor.name, n.data[1], *anchor.anchor_indices(n.args), order=n.data[2]))
         return substitute(root, pairs) if pairs else root
 
     found = model.rewritten(new)

@@ -14,7 +14,7 @@ from collections.abc import Iterator
 from dataclasses import replace
 
 from sysdyn.compiler.forms.efforts import Effort, efforts
-from sysdyn.compiler.forms.momenta import moved
+from sysdyn.compiler.forms.momenta import coordinates_with_inertia
 from sysdyn.compiler.model.energies import EnergyModel, Row
 from sysdyn.compiler.model.terms import Nest, local_variables
 from sysdyn.dsl.model.calculus import derivative
@@ -33,7 +33,7 @@ class _Told:
 
 def with_efforts_of_stores(model: EnergyModel) -> EnergyModel:
     """The model whose laws read the stores in series with what they are of."""
-    told = dict(_told(model))
+    told = dict(_series_pairs(model))
     if not told:
         return model
 
@@ -53,13 +53,15 @@ def with_efforts_of_stores(model: EnergyModel) -> EnergyModel:
     return replace(model, rows=tuple(map(row, model.rows)))
 
 
-def _told(model: EnergyModel) -> Iterator[tuple[str, _Told]]:
-    heavy, shapes = moved(model), {u.name: u.shape for u in model.unknowns}
+def _series_pairs(model: EnergyModel) -> Iterator[tuple[str, _Told]]:
+    """Coordinates without inertia between one store and one implicit effort: the effort's value by the store's."""
+    heavy, shapes = coordinates_with_inertia(model), {u.name: u.shape for u in model.unknowns}
     balances: dict[str, list[Effort]] = {}
     for effort in efforts(model):
         balances.setdefault(effort.on.data[0], []).append(effort)
     for name, balance in balances.items():
         kinds = sorted(balance, key=lambda e: e.name)
+        # two efforts balance each other: the store's and the implicit one
         if name in heavy or [e.name for e in kinds] != ["implicit", "potential"]:
             continue
         implicit, stored = kinds
@@ -68,6 +70,7 @@ def _told(model: EnergyModel) -> Iterator[tuple[str, _Told]]:
             continue
         y = found[0]
         factor = derivative(implicit.value, y)
+        # linear in the implicit effort, over all its elements
         whole = _whole(implicit.nest, y.args, shapes[y.data[0]]) and implicit.on.args == y.args
         if whole and not variables(factor) and (stored.nest, stored.on) == (implicit.nest, implicit.on):
             yield y.data[0], _Told(y.args, neg(div(stored.value, factor)))

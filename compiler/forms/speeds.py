@@ -90,18 +90,22 @@ def speeds_of(model: EnergyModel, kept: frozenset[str]) -> Speeds:
     columns: dict[str, Mapping[str, Node]] = {}
     rest: dict[str, Node] = {}
     left_out: set[str] = set()
+    # each set of flows that constraints and quasi-velocities join
     for names, part in _parts(lines):
         labels = {line.label for line in part if line.speed is None}
+        # left to Lagrange's multipliers
         if labels & kept or len(names) > LARGEST or not names <= set(scalars) or len(labels) == len(part):
             continue
         order = [name for name in scalars if name in names]
-        square = _completed(model, part, order)
+        # as many independent lines as flows, inverted: flows by speeds
+        square = _complete_basis(model, part, order)
         inverted = inverse([[line.entries.get(name, const(0.0)) for name in order] for line in square])
         for k, line in enumerate(square):
             if line.speed is not None:
                 found.append(line.speed)
                 column = {name: inverted[j][k] for j, name in enumerate(order)}
                 columns[line.speed.name] = {n: v for n, v in column.items() if not is_const(v, 0.0)}
+        # the part of a flow that does not depend on speeds
         for j, name in enumerate(order):
             rest[name] = neg(add(*(mul(inverted[j][k], line.rest) for k, line in enumerate(square))))
         left_out |= labels
@@ -146,7 +150,7 @@ def _parts(lines: Sequence[_Line]) -> list[tuple[set[str], list[_Line]]]:
     return found
 
 
-def _completed(model: EnergyModel, part: Sequence[_Line], order: Sequence[str]) -> list[_Line]:
+def _complete_basis(model: EnergyModel, part: Sequence[_Line], order: Sequence[str]) -> list[_Line]:
     """The lines and as many flows as make them a square of full rank."""
     units = {c.name: c for c in model.coordinates}
     square: list[_Line] = []
@@ -179,6 +183,7 @@ def _rank(lines: Sequence[_Line], order: Sequence[str]) -> int:
 
 
 def _rank_at(lines: Sequence[_Line], order: Sequence[str], drawn: random.Random) -> int:
+    """Rank of the lines' coefficients at a random point, by Gaussian elimination with pivoting in rows."""
     known: dict[Node, float] = {}
     roots = [line.entries.get(name, const(0.0)) for line in lines for name in order]
     values = evaluate(roots, lambda node: known.setdefault(node, drawn.uniform(0.3, 1.2)))

@@ -21,7 +21,7 @@ NONNEGATIVE = frozenset(("exp", "cosh", "abs", "hypot", "step"))
 
 def steep(root: Node) -> bool:
     """Whether an unknown enters by anything but sums, products, constant powers and mild functions."""
-    for node in _met(root):
+    for node in _live_nodes(root):
         mild = node.op in ("sum", "mul", "var", "reduce") or (node.op == "call" and node.data in MILD)
         if not mild and not _frozen(node) and any(v.op == "var" for v in variables(node)):
             return True
@@ -36,11 +36,11 @@ def _live(node: Node) -> bool:
 
 def _frozen(node: Node) -> bool:
     """Whether a conditional, or a condition, changes at events alone."""
-    met = _met(node.args[0] if node.op == "cond" else node)
+    met = _live_nodes(node.args[0] if node.op == "cond" else node)
     return node.op in ("cond", "and", "or", "not") and not any(n.op == "var" for n in met)
 
 
-def _met(root: Node) -> list[Node]:
+def _live_nodes(root: Node) -> list[Node]:
     """The nodes below root that count while branches are frozen."""
     found: dict[Node, None] = {}
     stack = [root]
@@ -63,6 +63,7 @@ def magnitude(root: Node) -> Node:
 
 
 def _magnitude(node: Node, done: dict[Node, Node]) -> Node:
+    """Sum of the magnitudes of the terms of a node: the size against which round-off counts."""
     match node.op:
         case "const":
             return const(abs(node.data))
@@ -70,9 +71,11 @@ def _magnitude(node: Node, done: dict[Node, Node]) -> Node:
             constant, coefficients = node.data
             pairs = zip(coefficients, node.args, strict=True)
             return linear(abs(constant), ((abs(c), done[a]) for c, a in pairs))
+        # factors below are divided by their own value
         case "mul":
             pairs = zip(node.data, node.args, strict=True)
             return product(1.0, ((e, done[a] if e > 0.0 else call("abs", a)) for e, a in pairs))
+        # of the branch that holds
         case "cond":
             test, then, other = node.args
             return conditional(test, done[then], done[other])
@@ -81,7 +84,7 @@ def _magnitude(node: Node, done: dict[Node, Node]) -> Node:
     return call("abs", node)
 
 
-def scaled(form: DescriptorForm) -> DescriptorForm:
+def add_scale_blocks(form: DescriptorForm) -> DescriptorForm:
     """The form with the scale blocks of the row families that hold a steep law; as it is where none does."""
     held = [block for block in form.blocks if block.name in SCALED]
     found = {s.row for block in held for kernel in block.kernels for s in kernel.rows if steep(s.expression)}

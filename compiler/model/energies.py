@@ -14,7 +14,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import field, replace
 
-from sysdyn.compiler.model.mirror import PRIMAL, Mirror, function_name, lettered
+from sysdyn.compiler.model.mirror import PRIMAL, Mirror, function_name, with_family_letters
 from sysdyn.compiler.model.terms import Nest, Term, canonical, counter, local_variables, split, without_nested
 from sysdyn.dsl.model.calculus import derivative
 from sysdyn.dsl.model.dimensions import TIME
@@ -198,8 +198,9 @@ def energies(network: Network) -> EnergyModel:
         speeds=tuple(Quantity(o.name, flows(o.expression), False, o.unit.text, o.place) for o in network.speeds),
         switched=frozenset(s.label for s in network.switches if s.holds is None),
         discretes=frozenset(network.discretes),
-        assigned=frozenset(_assigned(network)),
+        assigned=frozenset(_assigned_states(network)),
     )
+    # displacements that a statement reads are tangible: they stay unknowns
     touched = tangible(model)
     coordinates = tuple(replace(c, tangible=c.name in touched) for c in model.coordinates)
     return replace(model, coordinates=coordinates)
@@ -234,12 +235,12 @@ def _works(network: Network) -> Iterator[Virtual]:
         for outer in without_nested(split(effort, nest, work.place), "an effort"):
             for inner in without_nested(split(on, nest, work.place), "the displacement of a work"):
                 own = inner.loops[len(nest) :]
-                added, moved = _moved(own, len(nest), len(outer.loops))
+                added, moved = _renumber_loops(own, len(nest), len(outer.loops))
                 moving, loops = substitute(inner.expression, moved), (*outer.loops, *added)
                 yield Virtual(outer.expression, moving, loops, work.place, work.account)
 
 
-def _moved(own: Nest, start: int, depth: int) -> tuple[Nest, dict[Node, Node]]:
+def _renumber_loops(own: Nest, start: int, depth: int) -> tuple[Nest, dict[Node, Node]]:
     """Loops numbered from `start` numbered from `depth` instead."""
     change = {counter(start + k): counter(depth + k) for k in range(len(own))}
     nest = tuple(
@@ -263,7 +264,7 @@ def _dynamics(network: Network) -> Iterator[Row]:
         yield Row("lambda", state.data[0], state.args, pieces, nest, d.place)
 
 
-def _assigned(network: Network) -> Iterator[str]:
+def _assigned_states(network: Network) -> Iterator[str]:
     """States that events assign."""
     for event in network.events:
         for action in event.actions:
@@ -320,7 +321,7 @@ def show(model: EnergyModel, formulation: str = "lagrangian") -> str:
     """
 
     def text(root: Node) -> str:
-        return repr(lettered(formulation, root))
+        return repr(with_family_letters(formulation, root))
 
     kind = "cocoordinate" if formulation.startswith("co_") else "coordinate"
     lines = [f"{kind} {c.name}{_extent(c.shape)}{' tangible' if c.tangible else ''}" for c in model.coordinates]

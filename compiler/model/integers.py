@@ -33,7 +33,7 @@ class Index:
     constant: int
     table: int = -1
 
-    def listed(self) -> list[int]:
+    def as_list(self) -> list[int]:
         """Its numbers; of a table only where there is one."""
         return [self.loop, self.slot, self.constant, *([self.table] if self.table >= 0 else [])]
 
@@ -78,9 +78,11 @@ class Integers:
 
     def index(self, node: Node, loops: dict[str, int]) -> Index:
         """An index expression as an affine form; ModelError E806 where it is none."""
+        # x[list[i]]: the inner index, then the table of picks
         if node.op == "param" and node.args and node.data.startswith("#"):
             own = self.index(node.args[0], loops)
             return Index(own.loop, own.slot, own.constant, self.slot("picks", node.data))
+        # i, i + 1, i + n - 1: at most one counter of coefficient 1, a whole number, parameters
         constant, parts = 0.0, [(1.0, node)]
         if node.op == "const":
             constant, parts = node.data, []

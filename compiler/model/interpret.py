@@ -59,6 +59,7 @@ def _values(nodes: Iterable[Node], lookup: Lookup) -> dict[Node, Value]:
 
 
 def _value(node: Node, args: list[Value], lookup: Lookup) -> Value:
+    """Value of a node, an array over iterations, from those of its arguments."""
     match node.op:
         case "const":
             return np.float64(node.data)
@@ -88,6 +89,7 @@ def _value(node: Node, args: list[Value], lookup: Lookup) -> Value:
             return np.logical_not(args[0])
         case "reduce":
             return _reduce(node, args, lookup)
+        # leaves and tables
         case _:
             return lookup(node, args)
 
@@ -113,7 +115,7 @@ def grid(nest: Nest, lookup: Lookup) -> dict[str, NDArray[np.float64]]:
     """Loop variables of a nest as arrays over its iterations, last loop fastest."""
     columns: dict[str, NDArray[np.float64]] = {}
     for loop in nest:
-        inside = looped(columns, lookup)
+        inside = with_loop_variables(columns, lookup)
         low, high = (np.rint(np.asarray(v)) for v in evaluate([loop.first, loop.last], inside))
         size = len(next(iter(columns.values()))) if columns else 1
         low, high = np.broadcast_to(low, size), np.broadcast_to(high, size)
@@ -129,10 +131,10 @@ def over(nest: Nest, roots: Sequence[Node], lookup: Lookup) -> list[NDArray[np.f
     """Values of expressions for all iterations of a nest, one array each (one element without loops)."""
     columns = grid(nest, lookup)
     size = len(next(iter(columns.values()))) if columns else 1
-    values = evaluate(roots, looped(columns, lookup))
+    values = evaluate(roots, with_loop_variables(columns, lookup))
     return [np.broadcast_to(np.asarray(v, dtype=float), (size,)).copy() for v in values]
 
 
-def looped(columns: Mapping[str, Value], lookup: Lookup) -> Lookup:
+def with_loop_variables(columns: Mapping[str, Value], lookup: Lookup) -> Lookup:
     """Loop variables by name: nodes of other `fresh` blocks mean the same."""
     return lambda node, args: columns[node.data] if node.op == "index" and node.data in columns else lookup(node, args)

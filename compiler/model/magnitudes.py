@@ -41,8 +41,10 @@ def _own(node: Node, value: dict[Node, Value], found: dict[Node, Value]) -> Valu
     sizes = [found[a] for a in node.args]
     relative = [_ratio(found[a], value[a]) for a in node.args]
     match node.op:
+        # terms that cancel leave the size of the terms
         case "sum":
             return abs(node.data[0]) + sum(abs(c) * s for c, s in zip(node.data[1], sizes, strict=True))
+        # relative errors add up; of a product that is zero the other factors count
         case "mul":
             if all(e == 1.0 for e in node.data):
                 return np.prod(np.broadcast_arrays(*sizes), axis=0)
@@ -50,6 +52,7 @@ def _own(node: Node, value: dict[Node, Value], found: dict[Node, Value]) -> Valu
             parts = zip(node.data, sizes, node.args, strict=True)
             factors = [s**e if e > 0.0 else np.abs(value[a]) ** e for e, s, a in parts]  # of zeros that cancel above
             return np.where(value[node] == 0.0, np.prod(np.broadcast_arrays(*factors), axis=0), own)
+        # the exponent multiplies the relative error of the base
         case "pow":
             return own * (1.0 + np.abs(value[node.args[1]]) * relative[0])
         case "call" | "table":
@@ -72,7 +75,7 @@ def rounding(root: Node) -> Node:
     found: dict[Node, Node] = {}
     for node in topological_unbound([root]):
         exact = node.op in EXACT or any(a not in found for a in node.args)
-        found[node] = const(0.0) if exact else add(_own_rounding(node), *_inherited(node, found))
+        found[node] = const(0.0) if exact else add(_own_rounding(node), *_propagated_errors(node, found))
     return found[root]
 
 
@@ -83,7 +86,7 @@ def _own_rounding(node: Node) -> Node:
     return linear(abs(node.data[0]), [(abs(c), call("abs", a)) for c, a in zip(node.data[1], node.args, strict=True)])
 
 
-def _inherited(node: Node, found: dict[Node, Node]) -> Iterator[Node]:
+def _propagated_errors(node: Node, found: dict[Node, Node]) -> Iterator[Node]:
     """What the errors of the arguments come to; of an exact argument none, also where the derivative is a pole."""
     for argument, partial in zip(node.args, partials(node), strict=True):
         error = found[argument]

@@ -46,13 +46,13 @@ def function_name(formulation: str, name: str) -> str:
     return _FUNCTIONS.get(name, name) if formulation.startswith("co_") else name
 
 
-def spelled(formulation: str, name: str, kind: str) -> str:
+def family_name(formulation: str, name: str, kind: str) -> str:
     """A name with its family's letter: x.p of the reflection is x.q, law.e law.f."""
     own = formulation.startswith("co_") and kind in ("p", "e") and name.endswith(f".{kind}")
     return f"{name[:-2]}.{_REFLECTED[kind]}" if own else name
 
 
-def lettered(formulation: str, root: Node) -> Node:
+def with_family_letters(formulation: str, root: Node) -> Node:
     """An expression for a reader: conjugates and implicit unknowns by their family's letter."""
     if not formulation.startswith("co_"):
         return root
@@ -61,7 +61,7 @@ def lettered(formulation: str, root: Node) -> Node:
         if node.op == "var" and node.data[1] in ("p", "e"):
             owner, kind, order = node.data
             shown = var(owner, "bq", *node.args, order=order) if kind == "p" else None
-            change[node] = shown or var(spelled(formulation, owner, kind), kind, *node.args, order=order)
+            change[node] = shown or var(family_name(formulation, owner, kind), kind, *node.args, order=order)
     return substitute(root, change) if change else root
 
 

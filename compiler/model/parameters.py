@@ -50,7 +50,7 @@ class Parameters:
             self._settings.setdefault(setting.name, []).append(setting)
         self._given = {key if isinstance(key, str) else key[0] for key in overrides} | self._settings.keys()
         self._check(overrides)
-        for parameter in self._ordered(overrides):
+        for parameter in self._dependency_order(overrides):
             self._bind(parameter, overrides)
         if network.scene is not None and network.scene.start is not None:
             self.start = float(evaluate([network.scene.start], self.lookup)[0])
@@ -61,7 +61,7 @@ class Parameters:
             if plain not in self._known:
                 raise ModelError([Diagnostic("E405", f"there is no parameter '{plain}'", None)])
 
-    def _ordered(self, overrides: Mapping[Override, Any]) -> list[Parameter]:
+    def _dependency_order(self, overrides: Mapping[Override, Any]) -> list[Parameter]:
         """Parameters after those that their values and shapes use."""
         known = self._known
         order, circles = in_order(known, lambda name: self._uses(known[name], name in overrides))
@@ -80,7 +80,11 @@ class Parameters:
         return [n for n in dict.fromkeys(n.data for n in nodes if n.op == "param") if n in self._known]
 
     def _bind(self, parameter: Parameter, overrides: Mapping[Override, Any]) -> None:
+        """Bind a parameter: overrides before its formula, then elements that the scene or the caller sets; E805 of
+        wrong shapes.
+        """
         name, place = parameter.name, parameter.place
+        # most parameters are a number that nothing sets
         if name not in self._given and (number := _number(parameter)) is not None:
             self.values[name] = number
             return
@@ -90,6 +94,7 @@ class Parameters:
             raise ModelError([Diagnostic("E805", text, place)])
         if parameter.shape:
             self.boxes[name] = box
+        # a number for all elements, or an array of the shape
         if name in overrides:
             values = np.asarray(overrides[name], dtype=float)
             if values.shape not in ((), extents(box)):
@@ -98,9 +103,11 @@ class Parameters:
             values = np.broadcast_to(values, extents(box)).copy()
         else:
             values = self._formula(parameter, box)
+        # elements of the scene, by their indices
         for setting in () if name in overrides else self._settings.get(name, ()):
-            *at, value = evaluate((*setting.at, setting.value), self.checked(setting.place))
+            *at, value = evaluate((*setting.at, setting.value), self.lookup_at_place(setting.place))
             values[self._element(name, box, tuple(at), setting.place)] = value
+        # elements of the caller come last
         for key, value in overrides.items():
             if not isinstance(key, str) and key[0] == name:
                 values[self._element(name, box, key[1:], place)] = value
@@ -112,8 +119,9 @@ class Parameters:
 
     def _formula(self, parameter: Parameter, box: Extents) -> NDArray[np.float64]:
         """The values as the text gives them."""
-        lookup = self.checked(parameter.place)
+        lookup = self.lookup_at_place(parameter.place)
         shape = extents(box)
+        # `m[i] = 2*i`: the formula at each index
         if parameter.indices:
             pairs = zip(parameter.indices, box, strict=False)  # indices that follow hold a list, or one value for all
             nest = tuple(Loop(name, const(first), const(last)) for name, (first, last) in pairs)
@@ -121,12 +129,14 @@ class Parameters:
             rest = int(np.prod(shape[len(parameter.indices) :]))
             values = np.broadcast_to(columns, (columns.shape[0], rest)).flatten()
         else:
+            # a list, or one number for all elements
             values = np.asarray([float(v) for v in evaluate(parameter.values, lookup)])
             if len(values) != int(np.prod(shape)):
                 if len(values) != 1:
                     text = f"'{parameter.name}' has {int(np.prod(shape))} elements, {len(values)} are given"
                     raise ModelError([Diagnostic("E805", text, parameter.place)])
                 values = np.repeat(values, int(np.prod(shape)))
+        # `inf` written in the text is E324; an overflow is told by what calculates
         said = (n.data for n in topological(parameter.values) if n.op == "const")
         if np.any(np.isinf(values)) and any(map(math.isinf, said)):
             text = f"parameter '{parameter.name}' is inf, which no parameter can be: a run calculates with it"
@@ -182,14 +192,14 @@ class Parameters:
             at.append(rounded - first)
         return values[tuple(at)]
 
-    def checked(self, place: Place) -> Callable[[Node, list[Value]], Value]:
+    def lookup_at_place(self, place: Place) -> Callable[[Node, list[Value]], Value]:
         """`lookup` with the place added to what it finds wrong."""
 
         def look(node: Node, args: list[Value]) -> Value:
             try:
                 return self.lookup(node, args)
             except ModelError as error:
-                raise ModelError([_placed(d, place) for d in error.diagnostics]) from None
+                raise ModelError([_add_place(d, place) for d in error.diagnostics]) from None
 
         return look
 
@@ -208,7 +218,7 @@ def _number(parameter: Parameter) -> float | None:
     return node.data if node.op == "const" and math.isfinite(node.data) else None
 
 
-def _placed(found: Diagnostic, place: Place) -> Diagnostic:
+def _add_place(found: Diagnostic, place: Place) -> Diagnostic:
     return Diagnostic(found.code, found.message, found.place or place, found.help, found.related, found.label)
 
 

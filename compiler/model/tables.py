@@ -25,11 +25,11 @@ def numbers(table: Table) -> Array:
     values = np.asarray(table.values, dtype=float)
     if len(axes) == 1:
         rows = coefficients(axes[0], values, table.method, table.outside)
-        return np.concatenate((_closed(axes[0], table.outside), rows.ravel()))
+        return np.concatenate((_lookup_points(axes[0], table.outside), rows.ravel()))
     return np.concatenate((axes[0], axes[1], values))
 
 
-def _closed(x: Array, outside: str) -> Array:
+def _lookup_points(x: Array, outside: str) -> Array:
     """The breakpoints that pieces are looked up by: of a table that stops, the last one still belongs to its piece."""
     if outside != "stop":
         return x
@@ -136,7 +136,7 @@ def evaluate(table: Table, arguments: list[Any], orders: tuple[int, ...]) -> Any
     u, order = np.asarray(arguments[0], dtype=float), orders[0]
     x = np.asarray(table.points[0], dtype=float)
     rows = coefficients(x, np.asarray(table.values, dtype=float), table.method, table.outside)
-    piece = np.sum(u[..., None] >= _closed(x, table.outside), axis=-1)
+    piece = np.sum(u[..., None] >= _lookup_points(x, table.outside), axis=-1)
     distance = u - x[np.maximum(piece - 1, 0)]
     value = np.zeros_like(u)
     for power in range(order, 4):
@@ -147,16 +147,19 @@ def evaluate(table: Table, arguments: list[Any], orders: tuple[int, ...]) -> Any
 
 
 def _bilinear(table: Table, arguments: list[Any], orders: tuple[int, ...]) -> Any:
+    """Bilinear interpolation in two arguments and its first derivatives; higher ones are zero."""
     x, z = (np.asarray(points, dtype=float) for points in table.points)
     g = np.asarray(table.values, dtype=float).reshape(len(x), len(z))
     if max(orders) > 1:
         return np.zeros(np.broadcast(*arguments).shape)
     parts = []
+    # in each argument the cell, and the weights of its two ends
     for axis, u, order in zip((x, z), arguments, orders, strict=True):
         held = np.clip(u, axis[0], axis[-1]) if table.outside != "extend" else np.asarray(u)
         i = np.clip(np.searchsorted(axis, held, side="right") - 1, 0, len(axis) - 2)
         h = axis[i + 1] - axis[i]
         pair = (1 - (held - axis[i]) / h, (held - axis[i]) / h) if order == 0 else (-1 / h, 1 / h)
+        # a clamped argument has no slope; beyond a table that stops there is no value
         live = np.where((held != u) & (order > 0), 0.0, 1.0)
         if table.outside == "stop":
             live = np.where(held != u, np.nan, live)

@@ -14,6 +14,7 @@ from collections.abc import Iterable, Sequence
 from sysdyn.dsl.model.expression import (
     Node,
     add,
+    combine_terms,
     const,
     index,
     is_const,
@@ -22,7 +23,6 @@ from sysdyn.dsl.model.expression import (
     product,
     reads,
     rebuild,
-    reduced,
     reduction,
     scale,
     substitute,
@@ -97,20 +97,25 @@ def split(root: Node, loops: Nest, place: Place, *, read: bool = False) -> tuple
     work: deque[tuple[float, Node, Node, Nest]] = deque([(1.0, const(1.0), root, loops)])
     while work:
         factor, by, node, nest = work.popleft()
+        # a term each
         if node.op == "sum":
             constant, coefficients = node.data
             work.extend((factor * c, by, a, nest) for c, a in zip(coefficients, node.args, strict=True))
             if constant:
                 found.append(Term(linear(0.0, ((factor * constant, by),)), nest, place))
+        # a sum over a range: a loop more
         elif node.op == "reduce" and node.data[0] == "sum":
             first, last, body = node.args
             own = counter(len(nest))
             deeper = (*nest, Loop(f"#{len(nest)}", first, last))
             work.append((factor, by, substitute(body, {index(node.data[1]): own}), deeper))
+        # a product with one sum: the sum's terms, the rest as their factor
         elif node.op == "mul" and (parts := _linear_factor(node)) and not (read and has_reduction(parts[0])):
             work.append((factor, mul(by, parts[0]), parts[1], nest))
+        # the product of two sums: a double loop
         elif has_reduction(by) and not read:
             work.append((factor, const(1.0), mul(by, node), nest))
+        # nothing more to be split
         else:
             found.append(Term(product(factor, ((1.0, by), (1.0, node))), nest, place))
     return tuple(t for t in found if not (t.expression.op == "const" and t.expression.data == 0.0))
@@ -159,6 +164,7 @@ def _written_out(term: Term, what: str) -> Node:
 
 
 def _elements(node: Node, args: tuple[Node, ...], place: Place, what: str) -> Node:
+    """A reduction inside of a nonlinear function, written out over bounds that are numbers; N608 of others."""
     operator, name = node.data
     first, last, body = args
     if first.op != "const" or last.op != "const" or last.data - first.data >= LARGEST_LITERAL:
@@ -168,7 +174,7 @@ def _elements(node: Node, args: tuple[Node, ...], place: Place, what: str) -> No
     parts = [substitute(body, {index(name): const(k)}) for k in range(int(first.data), int(last.data) + 1)]
     if not parts and operator not in ("sum", "prod"):
         raise ModelError([Diagnostic("N608", f"the {operator} over an empty range", place)])
-    return reduced(operator, parts)
+    return combine_terms(operator, parts)
 
 
 def summands(root: Node) -> list[Node]:
@@ -206,6 +212,7 @@ def is_affine(root: Node, changing: frozenset[str]) -> bool:
     `changing` enter a constant.
     """
     affine: dict[Node, bool] = {}
+    # bottom up: each node is affine where its moving arguments are, one of them in a product
     for node in topological([root]):
         if node.op == "param" and node.data in changing:
             return False

@@ -28,7 +28,7 @@ def along(network: Network, *, complementary: bool) -> Network:
         return network
     if complementary:
         network = _with_transformers(network)
-    return _in_series(_beside(network))
+    return _in_series(_connect_along_nodes(network))
 
 
 def _combination(root: Node) -> Parts | None:
@@ -59,16 +59,19 @@ def _with_transformers(network: Network) -> Network:
     for b in network.branches:
         parts = None if b.on is None else _combination(b.on)
         own = b.at == loop_indices(b.loops)
+        # one displacement, or the difference of two nodes: connected without a transformer
         if parts is None or not own or _plain(parts):
             branches.append(b)
             continue
         shape = loop_ranges(b.loops)
+        # effort nodes: one point for all parts; flow nodes: a chain of points, which adds up displacements
         effort = b.domain.common == "effort"
         names = [f"{b.name}.inner{k}" for k in range(1, 2 if effort else len(parts) + 1)]
         nodes += [NodeFamily(name, shape, b.domain, b.place) for name in names]
         points = [Terminal(name, b.at) for name in names]
         ground = Terminal(None, ())
         branches.append(replace(b, on=None, plus=points[-1], minus=ground))
+        # a transformer for each part, its ratio the coefficient
         for k, (coefficient, displacement) in enumerate(parts):
             ends = (ground, points[0]) if effort else (points[k], points[k - 1] if k else ground)
             one, two = f"{b.name}.along{k + 1}#1", f"{b.name}.along{k + 1}#2"
@@ -95,7 +98,7 @@ def _plain(parts: Parts) -> bool:
 # -- between common-flow nodes -----------------------------------------------------------------------------
 
 
-def _beside(network: Network) -> Network:
+def _connect_along_nodes(network: Network) -> Network:
     """Elements along displacements of common-flow nodes and branches, between these nodes."""
     targets = _single(network.branches)
     absorbed: dict[str, list[tuple[int, Branch]]] = {}
@@ -105,20 +108,25 @@ def _beside(network: Network) -> Network:
         return b if found is None else replace(b, on=None, plus=found[0], minus=found[1])
 
     branches = tuple(ends(b) if b.on is not None else b for b in network.branches)
-    return _without(replace(network, branches=branches), absorbed)
+    return _drop_paths(replace(network, branches=branches), absorbed)
 
 
 def _ends(
     b: Branch, targets: dict[str, Branch], absorbed: dict[str, list[tuple[int, Branch]]]
 ) -> tuple[Terminal, Terminal] | None:
+    """Ends of an element along a displacement of nodes or branches, None where it is none of these; absorbed: by
+    branch.
+    """
     assert b.on is not None
     parts = _combination(b.on)
     if parts is None or b.domain.common != "flow" or not all(_unit(c) for c, _ in parts):
         return None
     ground = Terminal(None, ())
+    # q of nodes: plus at one, minus at the other or the ground
     if all(n.data[1] == "nq" for _, n in parts):
         signed = {_unit(c): Terminal(n.data[0], n.args) for c, n in parts}
         return (signed.get(1, ground), signed.get(-1, ground)) if len(signed) == len(parts) else None
+    # along a branch: between that branch's own ends
     root = _root(b, targets)
     if root is None:
         return None
@@ -154,7 +162,7 @@ def _root(b: Branch, targets: dict[str, Branch]) -> tuple[int, Branch] | None:
     return sign, here
 
 
-def _without(network: Network, found: dict[str, list[tuple[int, Branch]]]) -> Network:
+def _drop_paths(network: Network, found: dict[str, list[tuple[int, Branch]]]) -> Network:
     """The network without the branches that are only the way of the elements along them."""
     bare = _bare(network)
     ways = {name: elements for name, elements in found.items() if name in bare}
@@ -199,14 +207,14 @@ def _in_series(network: Network) -> Network:
     placed: dict[str, Branch] = {}
     nodes: list[NodeFamily] = []
     for chain in chains:
-        inner, branches = _placed(chain)
+        inner, branches = _place_chain(chain)
         nodes += inner
         placed |= {b.name: b for b in branches}
     network = replace(network, nodes=(*network.nodes, *nodes))
-    return _without(replace(network, branches=tuple(placed.get(b.name, b) for b in network.branches)), found)
+    return _drop_paths(replace(network, branches=tuple(placed.get(b.name, b) for b in network.branches)), found)
 
 
-def _placed(chain: _Chain) -> tuple[list[NodeFamily], Iterator[Branch]]:
+def _place_chain(chain: _Chain) -> tuple[list[NodeFamily], Iterator[Branch]]:
     """Nodes between the elements of a chain, and the elements there."""
     root = chain.root
     members = [*chain.elements, *([(1, root)] if chain.kept else [])]

@@ -24,12 +24,12 @@ def owner(name: str, authors: Authors) -> str | None:
     return head + mark if mark and head + mark in authors else None
 
 
-def shown(text: str, authors: Authors) -> str:
+def in_author_names(text: str, authors: Authors) -> str:
     """A text about families with the author's names."""
-    return _joined(_pieces(text, authors), 0) if "#" in text else text
+    return _text_of_element(_pieces(text, authors), 0) if "#" in text else text
 
 
-def told(found: Diagnostic, authors: Authors) -> Iterator[Diagnostic]:
+def split_finding(found: Diagnostic, authors: Authors) -> Iterator[Diagnostic]:
     """A finding about a family as one about each of its elements, at the author's places."""
     head = _NAME.search(found.message) if "#" in found.message else None
     own = None if head is None else authors.get(head[1])
@@ -40,7 +40,7 @@ def told(found: Diagnostic, authors: Authors) -> Iterator[Diagnostic]:
     first, last = (int(over[1]), int(over[2])) if over else (0, len(own) - 1)
     pieces = _pieces(found.message[: over.start()] if over else found.message, authors)
     for k in range(first, last + 1):
-        message = _joined(pieces, k)
+        message = _text_of_element(pieces, k)
         yield Diagnostic(found.code, message, own[k][1], found.help, found.related, found.label, found.edit)
 
 
@@ -64,6 +64,6 @@ def _pieces(text: str, authors: Authors) -> list[IndexBox]:
     return [*found, (text[end:], (), 0)]
 
 
-def _joined(pieces: list[IndexBox], at: int) -> str:
+def _text_of_element(pieces: list[IndexBox], at: int) -> str:
     """The text where i is `at`."""
     return "".join(own[min(at + step, len(own) - 1)][0] if own else text for text, own, step in pieces)

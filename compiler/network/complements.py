@@ -23,22 +23,23 @@ from sysdyn.dsl.model.rewriting import expressions, rewritten
 
 def complements(network: Network) -> Network:
     """The network with what holds at times of the flow of a branch said of its effort."""
-    alone = _alone(network)
+    alone = _single_flow_constraints(network)
     network = _by_turns(network, alone)
     found = {row.name: (row, effort) for row, effort in _of_effort(network, alone)}
     if not found:
         return network
 
-    def felt(root: Node) -> Node:
+    def reactions_as_efforts(root: Node) -> Node:
         """Reactions as the effort that they are a part of."""
         read = [n for n in ex.topological([root]) if n.op == "var" and n.data[0] in found and n.data[1] == "mu"]
-        return ex.substitute(root, {n: _at(found[n.data[0]], n.args)[1] for n in read}) if read else root
+        return ex.substitute(root, {n: _element_of(found[n.data[0]], n.args)[1] for n in read}) if read else root
 
     guards = {o.name: o.expression for o in network.observations}
+    # switches whose flow constraint becomes a condition on the effort
     dual = [s for s in network.switches if s.label in found]
-    watched = dict(pair for s in dual for pair in _watched(s, found[s.label]))
-    watched |= dict(_guarded(dual, found, guards))
-    network = rewritten(network, felt)
+    watched = dict(pair for s in dual for pair in _watched_efforts(s, found[s.label]))
+    watched |= dict(_guard_efforts(dual, found, guards))
+    network = rewritten(network, reactions_as_efforts)
     return replace(
         network,
         constraints=tuple(found[c.name][0] if c.name in found else c for c in network.constraints),
@@ -71,7 +72,8 @@ def _by_turns(network: Network, alone: Alone) -> Network:
     return replace(network, switches=switches, observations=(*network.observations, *beside)) if changed else network
 
 
-def _alone(network: Network) -> Alone:
+def _single_flow_constraints(network: Network) -> Alone:
+    """Constraints c*f = 0 of the flow of a branch without law or store, by that flow, with c."""
     free = {b.name for b in network.branches if b.law is None and b.kind == "field"}
     said = ex.topological(expressions(network, "energies", "works"))
     stored = {n.data[0] for n in said if n.op == "var" and n.data[1] in ("bf", "bq", "be", "bp")}
@@ -111,7 +113,7 @@ def _complete(network: Network, rows: list[Constraint]) -> bool:
     return said == [("guarded", True), ("psi", True)] and rows[0].loops == rows[1].loops and not asked
 
 
-def _at(what: tuple[Constraint, Node], at: tuple[Node, ...]) -> tuple[Node, Node]:
+def _element_of(what: tuple[Constraint, Node], at: tuple[Node, ...]) -> tuple[Node, Node]:
     """The expression of a row, and the reaction, of one element of an array."""
     row, reaction = what
     change = dict(zip(row.at, at, strict=True))
@@ -119,26 +121,28 @@ def _at(what: tuple[Constraint, Node], at: tuple[Node, ...]) -> tuple[Node, Node
     return expression, effort
 
 
-def _watched(s: Switch, what: tuple[Constraint, Node]) -> Iterator[tuple[str, Node]]:
+def _watched_efforts(s: Switch, what: tuple[Constraint, Node]) -> Iterator[tuple[str, Node]]:
     """What events read of the effort: of an inequality what is not negative while it is free."""
     at = tuple(ex.const(float(k)) for k in s.at)
-    row, _ = _at(what, at)
+    row, _ = _element_of(what, at)
     value = row if s.kind == "guarded" else ex.neg(row)
     yield s.value, value
     yield s.rate, time_derivative(value)
     yield s.multiplier, ex.var(s.label, "mu", *at)
 
 
-def _guarded(
+def _guard_efforts(
     dual: list[Switch], found: Mapping[str, tuple[Constraint, Node]], guards: Mapping[str, Node]
 ) -> Iterator[tuple[str, Node]]:
     """When rows of efforts hold: while the flow is not held, and no inequality of it is there beside an equation."""
     branches: dict[Node, list[Switch]] = {}
+    # switches of one branch together
     for s in dual:
         if s.guard is not None:
             at = tuple(ex.const(float(k)) for k in s.at)
-            (effort,) = (n for n in ex.variables(_at(found[s.label], at)[1]) if n.op == "var")
+            (effort,) = (n for n in ex.variables(_element_of(found[s.label], at)[1]) if n.op == "var")
             branches.setdefault(effort, []).append(s)
+    # the effort is zero while the flow is free; an inequality takes its place while it holds
     for same in branches.values():
         held = next(s for s in same if s.kind == "guarded")
         open_ = ex.sub(ex.const(1.0), guards[held.guard or ""])

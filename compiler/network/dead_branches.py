@@ -29,7 +29,7 @@ def dead_branches(network: Network, found: Sequence[Link], asked: frozenset[Quan
     alone = {q for q, links in touched.items() if links == 1 and q not in read}
     able = [b for b in network.branches if ("b", b.name) in alone and _able(b)]
     ends = [(b, q) for b in able for q in _nodes(b) if q in alone and len(set(_ends(b))) == 2]
-    grounded = _grounded(network) if ends else set[str | None]()
+    grounded = _nodes_joined_to_ground(network) if ends else set[str | None]()
     single = {("n", n.name) for n in network.nodes if n.name in grounded and not n.shape}
     dead = {b.name: end for b, end in reversed(ends) if end in single}  # of two ends the first
     if not dead:
@@ -60,6 +60,7 @@ def _ties(
     if not ties:
         return
     told = set(asked)
+    # what anything but a plain branch reads or joins must stay
     for link in found:
         plain = isinstance(link.item, Branch) and link.item.on is None
         told |= link.reads if plain else link.reads | link.joined
@@ -70,6 +71,7 @@ def _ties(
     seen = set[Quantity]()
     for b in ties:
         part, ahead, joins = set[Quantity](), [q for q in _nodes(b) if q not in seen], 0
+        # the part that the branch's nodes belong to, and how many branches join it to the ground
         while ahead:
             q = ahead.pop()
             if q not in part:
@@ -77,11 +79,12 @@ def _ties(
                 joins += sum(None in _ends(other) for other in beside[q])
                 ahead += [q for other in beside[q] for q in _nodes(other)]
         seen |= part
+        # a single tie carries no flow: the reference alone
         if joins == 1 and not part & told:
             yield frozenset({("b", b.name)})
 
 
-def _grounded(network: Network) -> set[str | None]:
+def _nodes_joined_to_ground(network: Network) -> set[str | None]:
     """Nodes that branches join to the ground of their domain (None)."""
     beside: dict[str | None, set[str | None]] = {}
     for b in network.branches:

@@ -15,7 +15,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import replace
 
 from sysdyn.compiler.network.neighbourhoods import MARK, RUN, Found, Run, Site, laws_of, side_by_side
-from sysdyn.compiler.network.skeleton import Shaped, filled, shaped
+from sysdyn.compiler.network.skeleton import Shaped, fill_shape, shape_of
 from sysdyn.compiler.network.strands import in_strands
 from sysdyn.dsl.model.expression import Node, add, const, index, param, substitute, var, variables
 from sysdyn.dsl.model.network import Branch, Initial, Loop, Network, NodeFamily, Parameter, Terminal
@@ -30,7 +30,7 @@ FEW = 64
 _INDEX = "#g"
 
 
-def gathered(network: Network, *, irregular: bool = True) -> Network:
+def gather_families(network: Network, *, irregular: bool = True) -> Network:
     """The network with families for what is alike; the network itself where little is.
 
     irregular: also where only tables tell what is joined to what.
@@ -40,15 +40,15 @@ def gathered(network: Network, *, irregular: bool = True) -> Network:
     laws = laws_of(network)
     best = side_by_side(network, laws)
     for kept in (best, ({}, [])) if irregular else ():
-        if _left(network, best) > FEW:
-            best = min(best, in_strands(network, laws, kept), key=lambda found: _left(network, found))
+        if _count_remaining(network, best) > FEW:
+            best = min(best, in_strands(network, laws, kept), key=lambda found: _count_remaining(network, found))
     sites, runs = best
     if sum(len(run.members) for run in runs) - len(runs) < LEAST:
         return network
     return _Families(network, sites, runs).network()
 
 
-def _left(network: Network, found: Found) -> int:
+def _count_remaining(network: Network, found: Found) -> int:
     """Statements of branches and nodes that remain."""
     sites, runs = found
     fewer = sum(len(run.members) - 1 for run in runs) + len(sites) - len({family for family, _ in sites.values()})
@@ -82,7 +82,7 @@ class _Families:
             elif b.name not in self.at:
                 branches.append(replace(b, plus=self._end(b.plus), minus=self._end(b.minus)))
         nodes = [f for node in whole.nodes for f in self._node(node)]
-        found = replace(rewritten(replace(whole, branches=tuple(branches)), self.moved), nodes=tuple(nodes))
+        found = replace(rewritten(replace(whole, branches=tuple(branches)), self.in_families), nodes=tuple(nodes))
         initials = tuple(self._initials(found.initials))
         places = {n.name: n.place for n in whole.nodes}
         authors = {names[0] + MARK: tuple((n, places[n]) for n in names) for names in self.names.values()}
@@ -108,7 +108,7 @@ class _Families:
         """A run as one statement in a loop."""
         head, shape = run.members[0]
         name, k, last = head.name + MARK, index(_INDEX), const(len(run.members) - 1)
-        law = filled(shape, name, (k,), self._numbers(name, [s.holes for _, s in run.members], head.place))
+        law = fill_shape(shape, name, (k,), self._numbers(name, [s.holes for _, s in run.members], head.place))
         ends = []
         for side, end in enumerate((head.plus, head.minus)):
             found = self._end(end)
@@ -116,12 +116,12 @@ class _Families:
                 found = Terminal(found.node, (add(k, found.at[0]),))
             elif found is not None and run.picked[side]:
                 own = [(b.plus, b.minus)[side] for b, _ in run.members]
-                found = Terminal(found.node, (self._picked(own, head.place),))
+                found = Terminal(found.node, (self._index_of_element(own, head.place),))
             ends.append(found)
         loops = (Loop(_INDEX, const(0), last),)
         return replace(head, name=name, at=(k,), loops=loops, law=law, plus=ends[0], minus=ends[1])
 
-    def _picked(self, ends: Sequence[Terminal | None], place: Place) -> Node:
+    def _index_of_element(self, ends: Sequence[Terminal | None], place: Place) -> Node:
         """Which element of its family each branch of a run meets."""
         places = [self.at[end.node][1] for end in ends if end is not None and end.node is not None]
         if places == list(range(places[0], places[0] + len(places))):
@@ -149,7 +149,7 @@ class _Families:
         named = next((v for v in values if v.op == "param"), None)
         return si(()) if named is None else self.units[named.data]
 
-    def moved(self, root: Node) -> Node:
+    def in_families(self, root: Node) -> Node:
         """An expression with elements of families for what stands by itself."""
         change = {}
         for n in sorted(variables(root), key=lambda n: n.number):
@@ -161,27 +161,30 @@ class _Families:
     def _initials(self, initials: Sequence[Initial]) -> Iterator[Initial]:
         """Initial values of neighbours that are said alike as one statement in a loop, in the place of the first."""
         groups: dict[tuple[object, ...], list[tuple[int, Initial, Shaped]]] = {}
+        # statements that differ by the element and numbers alone
         for i in initials:
             target, store = i.target, self.at.get(i.store, (i.store, 0))[0]
-            shape = shaped(i.value, "") if target.op == "var" and target.data[0].endswith(MARK) else None
+            shape = shape_of(i.value, "") if target.op == "var" and target.data[0].endswith(MARK) else None
             if shape is not None and not i.loops:
                 key = (target.data, i.fixed, store, i.unit, i.depth, i.said, shape.key)
                 groups.setdefault(key, []).append((int(target.args[0].data), i, shape))
         alike: dict[int, list[tuple[int, Initial, Shaped]]] = {}
+        # a run of neighbours, long enough
         for found in groups.values():
             places = [k for k, _, _ in found]
             if len(found) >= RUN and places == list(range(places[0], places[0] + len(found))):
                 alike |= {id(i): found if k == places[0] else [] for k, i, _ in found}
+        # the run in the place of its first statement
         for i in initials:
             if id(i) not in alike:
                 yield replace(i, store=self.at.get(i.store, (i.store, 0))[0])
             elif alike[id(i)]:
-                yield self._said(alike[id(i)])
+                yield self._gather_initials(alike[id(i)])
 
-    def _said(self, found: Sequence[tuple[int, Initial, Shaped]]) -> Initial:
+    def _gather_initials(self, found: Sequence[tuple[int, Initial, Shaped]]) -> Initial:
         first, head, shape = found[0]
         (name, kind, order), k = head.target.data, index(_INDEX)
-        value = filled(shape, "", (), self._numbers(name, [s.holes for _, _, s in found], head.place))
+        value = fill_shape(shape, "", (), self._numbers(name, [s.holes for _, _, s in found], head.place))
         target = var(name, kind, add(k, const(first)), order=order)
         loops = (Loop(_INDEX, const(0), const(len(found) - 1)),)
         return replace(head, target=target, value=value, loops=loops, store=self.at.get(head.store, (head.store, 0))[0])

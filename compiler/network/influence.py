@@ -56,6 +56,7 @@ def read_by(network: Network, roots: Iterable[Node]) -> frozenset[Quantity]:
 
 
 def _quantity(node: Node, unknowns: set[str]) -> Quantity:
+    """What a variable stands for in the graph of influences: its kind's letter and its owner's name."""
     name, kind, _ = node.data
     match kind:
         case "s":
@@ -90,6 +91,8 @@ def links(network: Network) -> tuple[Link, ...]:
 
 
 def _links(network: Network) -> Iterator[Link]:
+    """All statements of a network as links between quantities: joined both ways, or read one way."""
+    # summand by summand: a term that nobody needs may go alone
     for e in network.energies:
         for piece in summands(e.expression):
             yield replace(_acting(network, e, [piece], []), piece=piece)
@@ -113,7 +116,7 @@ def _acting(network: Network, item: Any, acted: Sequence[Node], read: Sequence[N
     return Link(item, joined, (all_ - joined) | read_by(network, read))
 
 
-def _held(network: Network, item: Any, root: Node, own: frozenset[Quantity]) -> Link:
+def _link_of_workless(network: Network, item: Any, root: Node, own: frozenset[Quantity]) -> Link:
     """A workless statement: its reactions hold signals fixed."""
     found = _acting(network, item, [signals_held(root)[0]], [root])
     return replace(found, joined=found.joined | own)
@@ -129,18 +132,18 @@ def _branch(network: Network, b: Branch) -> Link:
 
 
 def _coupling(network: Network, c: Coupling) -> Link:
-    return _held(network, c, c.ratio, frozenset({("b", c.first), ("b", c.second)}))
+    return _link_of_workless(network, c, c.ratio, frozenset({("b", c.first), ("b", c.second)}))
 
 
 def _constraints(network: Network) -> Iterator[Link]:
     for c in network.constraints:
         if c.kind != "gamma":
-            yield _held(network, c, c.expression, frozenset({("c", c.name)}))
-    for item, closed in _closed(network):
+            yield _link_of_workless(network, c, c.expression, frozenset({("c", c.name)}))
+    for item, closed in _closures(network):
         yield Link(item, closed, read_by(network, [item.expression]))
 
 
-def _closed(network: Network) -> Iterator[tuple[Constraint, frozenset[Quantity]]]:
+def _closures(network: Network) -> Iterator[tuple[Constraint, frozenset[Quantity]]]:
     """Each gamma with the implicit unknowns that it closes.
 
     One whose rows are those of its only unknown that no other closes, closes that one; what is left closes together.
@@ -169,14 +172,16 @@ def _whole(c: Constraint, shape: Shape) -> bool:
     return ranges == shape and c.at == loop_indices(c.loops)
 
 
-def reached(found: Sequence[Link], asked: frozenset[Quantity]) -> frozenset[Quantity]:
+def influences_on(found: Sequence[Link], asked: frozenset[Quantity]) -> frozenset[Quantity]:
     """All that influences what is asked: through what is joined both ways, through what is read one way."""
     of: dict[Quantity, list[int]] = {}
+    # which links join each quantity
     for k, link in enumerate(found):
         for q in link.joined:
             of.setdefault(q, []).append(k)
     kept, ahead = set(asked), list(asked)
     followed = bytearray(len(found))
+    # a joined quantity brings all that its links join and read
     while ahead:
         for k in of.get(ahead.pop(), ()):
             if not followed[k]:

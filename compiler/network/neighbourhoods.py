@@ -12,7 +12,7 @@ from collections import Counter
 from collections.abc import Iterator, Sequence
 from operator import itemgetter
 
-from sysdyn.compiler.network.skeleton import Shaped, shaped
+from sysdyn.compiler.network.skeleton import Shaped, shape_of
 from sysdyn.dsl.model.joined import Joined
 from sysdyn.dsl.model.network import Branch, Network, Terminal
 from sysdyn.values import dataclass
@@ -57,7 +57,7 @@ def laws_of(network: Network) -> Laws:
     """What each branch that may stand in a family has for a law, and its number among those that differ."""
     free, numbers, found = _free(network), dict[object, int](), Laws({}, {})
     for b in network.branches:
-        shape = shaped(b.law, b.name) if b.name in free else None
+        shape = shape_of(b.law, b.name) if b.name in free else None
         if shape is not None:
             found.shapes[b.name] = shape
             key = b.domain.name, b.kind, b.side, shape.key
@@ -90,6 +90,7 @@ def _sites(network: Network, laws: Laws) -> dict[str, Site]:
     parts = Joined[str]()
     touched: dict[str, list[int]] = {}
     kinds: dict[tuple[object, ...], int] = {}
+    # ends of which branches touch each node
     for b in network.branches:
         names = [end.node for end in (b.plus, b.minus) if end is not None and end.node is not None]
         if len(names) == 2:
@@ -100,6 +101,7 @@ def _sites(network: Network, laws: Laws) -> dict[str, Site]:
                 touched.setdefault(end.node, []).append(kind + k)
     found: dict[str, Site] = {}
     size: dict[str, int] = {}
+    # nodes touched alike are one family, numbered in the order of the text
     for node in network.nodes:
         if node.shape or node.name in network.read or MARK in node.name or node.name not in touched:
             continue
@@ -113,20 +115,22 @@ def _whole(network: Network, laws: Laws, sites: dict[str, Site]) -> Found:
     """Sites and runs without the families that single branches tear to pieces: these stay as they are written."""
     for _ in range(ROUNDS):
         runs = list(_runs(network, laws, sites))
-        torn = _torn(network, sites, runs)
+        torn = _fragmented_families(network, sites, runs)
         if not torn:
             return sites, runs
         sites = {name: site for name, site in sites.items() if site[0] not in torn}
     return {}, []
 
 
-def _torn(network: Network, sites: dict[str, Site], runs: Sequence[Run]) -> set[str]:
+def _fragmented_families(network: Network, sites: dict[str, Site], runs: Sequence[Run]) -> set[str]:
     """Families of which alike neighbours are fewer than SHORT on the average."""
     cuts: dict[str, set[int]] = {}
+    # where a run begins or ends a family is cut
     for run in runs:
         for (family, first), moves in zip(run.ends, run.moves, strict=True):
             cuts.setdefault(family, set()).update((first, first + (len(run.members) if moves else 1)))
     held = {b.name for run in runs for b, _ in run.members}
+    # so does a branch of no run
     for b in network.branches:
         for end in (b.plus, b.minus) if b.name not in held else ():
             if end is not None and end.node in sites:
@@ -144,6 +148,7 @@ def _runs(network: Network, laws: Laws, sites: dict[str, Site]) -> Iterator[Run]
         return ("", -1) if end.node is None else sites.get(end.node, (end.node, -1))
 
     groups: dict[tuple[object, ...], list[tuple[int, int, Branch, tuple[Site, Site]]]] = {}
+    # branches of one law between the same families, at one distance
     for b in network.branches:
         if b.name in laws.numbers:
             ends = site(b.plus), site(b.minus)
@@ -151,6 +156,7 @@ def _runs(network: Network, laws: Laws, sites: dict[str, Site]) -> Iterator[Run]
                 apart = ends[1][1] - ends[0][1] if min(ends[0][1], ends[1][1]) >= 0 else 0
                 key = laws.numbers[b.name], ends[0][0], ends[1][0], apart
                 groups.setdefault(key, []).append((ends[0][1], ends[1][1], b, ends))
+    # neighbours whose ends move on by one or stay
     for found in groups.values():
         found.sort(key=itemgetter(0, 1))
         first = 0

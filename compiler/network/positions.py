@@ -92,32 +92,34 @@ def with_positions(network: Network, wanted: frozenset[Wanted]) -> Network:
     """Positions as unknowns of the start, in parts where displacements are said or stores may stand in loops; wanted:
     displacements with quadratures.
     """
+    # contents of stores tell differences of positions
     springs = tuple(_springs(network, wanted))
     read = (n for n in ex.topological(expressions(network, "initials")) if n.op == "var")
     said = {n.data[0] for n in read if n.data[1] in ("nq", "bq", "be")}
+    # where anything else is said, all parts have positions
     open_ = _says_of_others(network) or _massless(network, springs)
     parts = _parts(network, springs, said | {name for name, _ in wanted}, open_=open_)
 
     def position(end: Terminal) -> Node:
         return ex.const(0.0) if end.node is None else ex.var(f"{end.node}.start", "start", *end.at)
 
-    def begun(join: _Join) -> Initial:
+    def initial_of(join: _Join) -> Initial:
         apart = ex.sub(position(join.plus), position(join.minus))
         return Initial(ex.sub(join.content, apart), ex.const(0.0), True, join.loops, join.place, join.name)
 
-    def positioned(root: Node) -> Node:
+    def substitute_positions(root: Node) -> Node:
         found = _positions([root])
         return ex.substitute(root, {n: position(Terminal(n.data[0], n.args)) for n in found}) if found else root
 
     nodes = [n for n in network.nodes if n.name in parts]
     points = (_point_of(n) for n in network.nodes if n.name in parts and (n.name, "nq") in wanted)
-    kept = rewritten(network, positioned, ("initials",)).initials
+    kept = rewritten(network, substitute_positions, ("initials",)).initials
     return replace(
         network,
         positions=tuple(State(f"{n.name}.start", n.shape, n.domain.displacement, n.place) for n in nodes),
         initials=(
             *(i for i in kept if not is_position(i.target, stores_of(network))),
-            *(begun(join) for join in (*springs, *points) if any(name in parts for name in join.nodes)),
+            *(initial_of(join) for join in (*springs, *points) if any(name in parts for name in join.nodes)),
         ),
     )
 

@@ -22,7 +22,7 @@ from dataclasses import replace
 from typing import Any
 
 from sysdyn.compiler.network.dead_branches import dead_branches
-from sysdyn.compiler.network.influence import EVERYTHING, Link, Quantity, links, quantities, reached, read_by
+from sysdyn.compiler.network.influence import EVERYTHING, Link, Quantity, influences_on, links, quantities, read_by
 from sysdyn.dsl.model.expression import add, variables
 from sysdyn.dsl.model.network import Energy, Network, Observation
 from sysdyn.dsl.model.rewriting import nodes_read
@@ -55,29 +55,29 @@ class Removal:
         return f"pruned, downstream: it reads {', '.join(self.reads)}, and nothing that the scene asks for reads it"
 
 
-def pruned(network: Network) -> tuple[Network, tuple[Removal, ...]]:
+def prune_network(network: Network) -> tuple[Network, tuple[Removal, ...]]:
     """What the scene needs of a network, and what was left out."""
-    asked = _asked(network)
+    asked = _requested_quantities(network)
     if not asked:
         return network, ()
     removals: list[Removal] = []
     for _ in range(len(network.branches) + 1):  # a round takes a branch away
         found = links(network)
-        kept = reached(found, asked)
+        kept = influences_on(found, asked)
         gone = frozenset(quantities(network)) - kept
         if gone:
             removals += _parts(network, found, kept, gone)
-            network = _without(network, found, gone)
+            network = _remove(network, found, gone)
             found = links(network)
         dead = dead_branches(network, found, asked)
         if not dead:
             break
-        removals += [Removal("dead branch", _named(network, part)) for part in dead]
-        network = _without(network, found, frozenset().union(*dead))
+        removals += [Removal("dead branch", _names_of(network, part)) for part in dead]
+        network = _remove(network, found, frozenset().union(*dead))
     return network, tuple(removals)
 
 
-def listed(removals: Iterable[Removal], most: int = 8000) -> str:
+def list_removals(removals: Iterable[Removal], most: int = 8000) -> str:
     """Names of all that was left out, with commas; of very many the first, and how many more."""
     names = list(dict.fromkeys(name for r in removals for _, name in r.names))
     taken: list[str] = []
@@ -90,7 +90,7 @@ def listed(removals: Iterable[Removal], most: int = 8000) -> str:
     return ", ".join(taken)
 
 
-def _asked(network: Network) -> frozenset[Quantity]:
+def _requested_quantities(network: Network) -> frozenset[Quantity]:
     """The quantities that the scene reads; none where everything is to be kept."""
     scene, roots = network.scene, [o.expression for o in network.observations]
     if scene is None or not network.traced or any(name.startswith("audit.") for name, _ in scene.accuracy_on):
@@ -101,14 +101,14 @@ def _asked(network: Network) -> frozenset[Quantity]:
     return frozenset() if EVERYTHING in found else found
 
 
-def _without(network: Network, found: Sequence[Link], gone: frozenset[Quantity]) -> Network:
+def _remove(network: Network, found: Sequence[Link], gone: frozenset[Quantity]) -> Network:
     """The network as if these quantities, and the statements that are theirs, had not been written."""
     away = {id(link.item) for link in found if link.piece is None and link.goes(gone)}
 
     def stay(letter: str, items: Iterable[Any]) -> tuple[Any, ...]:
         return tuple(item for item in items if (letter, item.name) not in gone)
 
-    def said(items: Iterable[Any]) -> tuple[Any, ...]:
+    def remaining(items: Iterable[Any]) -> tuple[Any, ...]:
         return tuple(item for item in items if id(item) not in away)
 
     left = replace(
@@ -117,13 +117,13 @@ def _without(network: Network, found: Sequence[Link], gone: frozenset[Quantity])
         unknowns=stay("u", network.unknowns),
         states=stay("s", network.states),
         nodes=stay("n", network.nodes),
-        branches=said(network.branches),
+        branches=remaining(network.branches),
         energies=tuple(_energies(found, gone)),
-        works=said(network.works),
-        constraints=said(network.constraints),
-        dynamics=said(network.dynamics),
-        initials=said(network.initials),
-        couplings=said(network.couplings),
+        works=remaining(network.works),
+        constraints=remaining(network.constraints),
+        dynamics=remaining(network.dynamics),
+        initials=remaining(network.initials),
+        couplings=remaining(network.couplings),
     )
     speeds = tuple(o for o in network.speeds if not _read(o) & (_families(network) - _families(left)))
     return replace(left, read=nodes_read(left), speeds=speeds)
@@ -163,12 +163,14 @@ def _parts(
     """The connected parts of what goes, in the order of the text."""
     head = {q: q for q in gone}
 
+    # union-find over what goes
     def first(q: Quantity) -> Quantity:
         while head[q] != q:
             head[q] = head[head[q]]
             q = head[q]
         return q
 
+    # which of what stays each part reads
     for link in found:
         own = sorted((link.joined | link.reads) & gone)
         for q in own[1:]:
@@ -180,13 +182,14 @@ def _parts(
     members: dict[Quantity, set[Quantity]] = {}
     for q in gone:
         members.setdefault(first(q), set()).add(q)
-    named = [(_named(network, own), tuple(sorted(reads.get(q, ())))) for q, own in members.items()]
+    named = [(_names_of(network, own), tuple(sorted(reads.get(q, ())))) for q, own in members.items()]
     order = {name: k for k, (_, name) in enumerate(quantities(network))}
+    # reads something: downstream; nothing: an island
     for names, read in sorted(named, key=lambda pair: min(order[name] for _, name in pair[0])):
         yield Removal("downstream" if read else "island", names, read)
 
 
-def _named(network: Network, part: Iterable[Quantity]) -> tuple[tuple[str, str], ...]:
+def _names_of(network: Network, part: Iterable[Quantity]) -> tuple[tuple[str, str], ...]:
     """Kind and name of each, by kind and in the order of the text; multipliers only where nothing else has the name."""
     wanted = set(part)
     return tuple((KINDS[letter], name) for letter, name in quantities(network) if (letter, name) in wanted)

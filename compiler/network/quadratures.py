@@ -10,7 +10,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 from dataclasses import replace
 
-from sysdyn.compiler.network.primal.bounds import Box, Sizes, without
+from sysdyn.compiler.network.primal.bounds import Box, Sizes, box_difference
 from sysdyn.compiler.network.primal.overlaps import ranges_of
 from sysdyn.dsl.model import expression as ex
 from sysdyn.dsl.model.expression import Node
@@ -36,6 +36,7 @@ def from_masses(network: Network) -> Network:
     """Momenta of points, and their rates, as those of the kinetic stores that move with them."""
     whole = massive(network)
     held: dict[str, list[tuple[float, Branch, tuple[Node, ...]]]] = {}
+    # kinetic stores at each node, with their sense
     for b in network.branches:
         for terminal, sign in ((b.plus, 1.0), (b.minus, -1.0)):
             if b.kind == "kinetic" and terminal is not None and terminal.node is not None:
@@ -44,6 +45,7 @@ def from_masses(network: Network) -> Network:
     def stores(node: Node) -> Node:
         """A store stands at all points of a family, or at one of them."""
         terms = []
+        # a store at this point, or one of a family at all of them
         for sign, b, at in held.get(node.data[0], ()):
             if not b.loops and at == node.args:
                 terms.append((sign, ex.var(b.name, "bp", *b.at, order=node.data[2])))
@@ -67,13 +69,13 @@ def with_quadratures(network: Network) -> tuple[Network, frozenset[Wanted]]:
     stores = stores_of(network)
     roots = ex.topological(expressions(network, "observations", "dynamics", "expectations", "branches.law"))
     wanted = dict.fromkeys((n.data[0], n.data[1]) for n in roots if is_position(n, stores))
-    return _integrated(network, wanted, "f"), frozenset(wanted)
+    return _add_quadratures(network, wanted, "f"), frozenset(wanted)
 
 
 def with_momenta(network: Network) -> Network:
     """The primal family's: NAME.p, p' = e, of dissipators whose law reads their own momentum."""
     wanted = {(b.name, "bp"): None for b in network.branches if b.kind == "dissipator" and reads(b, "bp")}
-    return _integrated(network, wanted, "e") if wanted else network
+    return _add_quadratures(network, wanted, "e") if wanted else network
 
 
 def reads(branch: Branch, kind: str) -> bool:
@@ -82,24 +84,28 @@ def reads(branch: Branch, kind: str) -> bool:
     return any(n.op == "var" and n.data[:2] == (branch.name, kind) for n in law)
 
 
-def _integrated(network: Network, wanted: Iterable[Wanted], rate: str) -> Network:
+def _add_quadratures(network: Network, wanted: Iterable[Wanted], rate: str) -> Network:
     """With a dynamic variable for each of these, of this rate (e or f), read in their places."""
     wanted = dict.fromkeys(wanted)
 
+    # the variable where it is read, and its rate
     def read(root: Node) -> Node:
         found = [n for n in ex.topological([root]) if n.op == "var" and n.data[:2] in wanted]
         change = {n: _quadrature(n.data[0], n.data[1][1], n.args, n.data[2]) for n in found}
         return ex.substitute(root, change) if found else root
 
     families: dict[Wanted, list[tuple[tuple[Loop, ...], tuple[Node, ...], Domain, Place]]] = {}
+    # loops and indices of all families that have displacements
     for n in network.nodes:
         families[n.name, "nq"] = [(*whole(n), n.domain, n.place)]
     for b in network.branches:
         for kind in ("bq", "bp"):
             families.setdefault((b.name, kind), []).append((b.loops, b.at, b.domain, b.place))
+    # quadratures that a law reads take part in the motion; others are measured alone
     laws = (n for law in expressions(network, "branches.law") for n in ex.variables(law) if n.op == "var")
     lawful = {n.data[:2] for n in laws}
     states, dynamics = [], []
+    # a state of the variable's range with its rate
     for name, kind in wanted:
         measured = (name, kind) not in lawful
         for loops, at, domain, place in families[name, kind]:
@@ -107,6 +113,7 @@ def _integrated(network: Network, wanted: Iterable[Wanted], rate: str) -> Networ
             states.append(State(f"{name}.{kind[1]}", shape, unit, place, measured=measured))
             own = _quadrature(name, kind[1], at)
             dynamics.append(Dynamic(own, ex.var(name, f"{kind[0]}{rate}", *at), loops, place))
+    # what is said of their start is said of the states
     told = {(*w, 0) for w in wanted if w[1] != "nq"}
     starts = [i for i in network.initials if i.target.op == "var" and i.target.data in told]
     begun = (replace(i, target=read(i.target)) for i in starts)
@@ -136,7 +143,7 @@ def massive(network: Network) -> frozenset[str]:
             reach = sizes.reach(b.plus.at, ranges_of(b.loops, sizes, b.place), b.place)
             found.setdefault(b.plus.node, []).append(reach)
     boxes = {n.name: sizes.box(n.shape, n.place) for n in network.nodes}
-    return frozenset(name for name, holes in found.items() if not without(boxes[name], *holes))
+    return frozenset(name for name, holes in found.items() if not box_difference(boxes[name], *holes))
 
 
 def stores_of(network: Network) -> frozenset[str]:

@@ -22,7 +22,7 @@ from sysdyn.compiler.network.quadratures import from_masses, massive, with_quadr
 from sysdyn.compiler.network.stated import ALL, as_elements
 from sysdyn.compiler.network.sticking import as_relations
 from sysdyn.compiler.network.ties import as_transformers
-from sysdyn.compiler.network.ungrounded import grounded
+from sysdyn.compiler.network.ungrounded import add_references
 from sysdyn.dsl.model import expression as ex
 from sysdyn.dsl.model.expression import Node
 from sysdyn.dsl.model.network import (
@@ -48,15 +48,17 @@ def reflect(network: Network) -> Network:
     The network must be complementary-expressible (`formulations`): no energy, work or constraint of its text reads a
     displacement or flow of a node or branch.
     """
-    bare = from_masses(from_stores(grounded(as_elements(as_relations(complements(as_transformers(network))), ALL))))
+    bare = from_masses(
+        from_stores(add_references(as_elements(as_relations(complements(as_transformers(network))), ALL)))
+    )
     network = with_positions(*with_quadratures(bare))
     # quadratures for traces change nothing in the model where a mass on the node tells its flow
     read = frozenset(_read(bare)) | (frozenset(_read(network)) - massive(network))
-    return replace(relabelled(network), read=read)
+    return replace(relabel(network), read=read)
 
 
-def relabelled(network: Network) -> Network:
-    """The same statements with the letters of the other family; twice is the network itself."""
+def relabel(network: Network) -> Network:
+    """Statements with the letters of the other family; twice is the network itself."""
     network = rewritten(network, _node)
     return replace(
         network,
@@ -116,19 +118,23 @@ def unreflectable(network: Network) -> Diagnostic | None:
     """The first statement that reads a displacement or flow where only momenta and efforts may stand (E602)."""
     network = as_elements(along(as_relations(complements(network)), complementary=True), ALL)
     help_ = "formulation lagrangian, hamiltonian"
+    # energies, works and constraints may read no displacement or flow
     statements: list[tuple[str, tuple[ex.Node, ...], Place]] = [
         (f"energy {e.function}", (e.expression,), e.place) for e in network.energies if e.function in ALL
     ]
     statements += [("work", (w.effort, w.on), w.place) for w in network.works]
     gammas = [(f"gamma {c.name}", (c.expression,), c.place) for c in network.constraints if c.kind == "gamma"]
     dual = {s.label for s in network.switches if s.dual}
+    # constraints that became conditions on efforts are reflected as these
     rest = [c for c in network.constraints if c.kind != "gamma" and c.name not in dual]
     statements += [(f"{c.kind} {c.name}", (c.expression,), c.place) for c in rest]
     # what stores nothing may be modulated by a quadrature
+    # laws of stores, ratios and gammas may read no other displacement
     stores = [b for b in network.branches if b.kind in ("kinetic", "potential")]
     laws = [(f"law of {b.name}", (b.law,), b.place) for b in stores if b.law is not None]
     moduli = [(f"ratio of {c.first.partition('#')[0]}", (c.ratio,), c.place) for c in network.couplings]
     lawful, at_times = {b.name for b in network.branches if b.law is not None}, {s.label for s in network.switches}
+    # the first that does is named
     for what, roots, place in statements:
         for node in ex.topological(roots):
             if node.op == "var" and node.data[1] in KINDS:
@@ -137,6 +143,7 @@ def unreflectable(network: Network) -> Diagnostic | None:
                 beside = node.data[1] == "bf" and node.data[0] in lawful and what.partition(" ")[2] in at_times
                 return Diagnostic("E602", message, place, help_ + series if beside else help_)
     stated = {b.name for b in network.branches if b.stated}
+    # a law may read its own store, and stores of one stated energy each other
     for what, roots, place in (*laws, *moduli, *gammas):
         own = what.removeprefix("law of ")
         for node in ex.topological(roots):
@@ -144,6 +151,7 @@ def unreflectable(network: Network) -> Diagnostic | None:
                 if own in stated and node.data[0] in stated:  # one energy over the displacements of several ports
                     continue
                 return Diagnostic("E602", f"{what} depends on displacement {node}", place, help_)
+    # an element along an expression that no node stands for
     wrong = next((b for b in network.branches if b.on is not None), None)
     if wrong is not None:
         message = f"'{wrong.name}' acts along an expression of displacements"

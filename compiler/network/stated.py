@@ -40,6 +40,7 @@ def as_elements(network: Network, functions: frozenset[str]) -> Network:
         functions = functions - {"T"}
     nodes = {n.name: n.domain for n in network.nodes}
     kept, made = [], []
+    # summand by summand, or else the whole: an element each, or the statement stays
     for number, energy in enumerate(network.energies):
         for pieces in (summands(energy.expression), [energy.expression]) if energy.function in functions else ():
             names = [f"{energy.function} {number}.{k}" for k in range(len(pieces))]
@@ -84,7 +85,9 @@ def _ends(on: Node) -> tuple[Terminal, Terminal] | None:
 def element(energy: Energy, piece: Node, name: str, nodes: dict[str, Domain]) -> Branch | None:
     """The branch whose law is the slope of an energy over u = x(a) - x(b), or None."""
     function = STATE_FUNCTIONS[energy.function]
-    used = sorted((n for n in ex.variables(piece) if n.op == "var" and not _held(n, function)), key=lambda n: n.number)
+    used = sorted(
+        (n for n in ex.variables(piece) if n.op == "var" and not _is_parameter(n, function)), key=lambda n: n.number
+    )
     if not 1 <= len(used) <= 2 or any(n.data[1] != _AT_NODES[function.name] or n.data[2] for n in used):
         return None
     a, b = used[0], used[1] if len(used) == 2 else None
@@ -113,10 +116,10 @@ def _on_branches(network: Network, functions: frozenset[str]) -> Network:
         for e in network.energies
         if _over_fields(e, fields, said) and (e.function in functions or len(ex.variables(e.expression)) == 1)
     ]
-    chosen = _closed(network, chosen, fields, said)
+    chosen = _closed_statements(network, chosen, fields, said)
     if not chosen:
         return network
-    rest, chosen = [e for e in network.energies if e not in chosen], _joined(chosen)
+    rest, chosen = [e for e in network.energies if e not in chosen], _merge_by_branches(chosen)
     laws: dict[str, Branch] = {}
     for name in dict.fromkeys(n for e in chosen for n in _owners(e)):
         laws[name] = _with_law(fields[name], [e for e in chosen if name in _owners(e)])
@@ -124,7 +127,7 @@ def _on_branches(network: Network, functions: frozenset[str]) -> Network:
     return replace(
         network,
         branches=tuple(laws.get(b.name, b) for b in network.branches),
-        energies=(*rest, *(_kept(e) for e in several if _is_store(e))),
+        energies=(*rest, *(_stored_function(e) for e in several if _is_store(e))),
     )
 
 
@@ -132,7 +135,7 @@ def _is_store(energy: Energy) -> bool:
     return STATE_FUNCTIONS[energy.function].edge != "dissipator"
 
 
-def _held(node: Node, function: StateFunction) -> bool:
+def _is_parameter(node: Node, function: StateFunction) -> bool:
     """Whether an unknown stands in a state function as a parameter: signals, and in contents what gammas close."""
     return node.data[1] == "s" or (node.data[1] == "e" and function.edge == "dissipator")
 
@@ -163,7 +166,7 @@ def _statements(network: Network, fields: dict[str, Branch]) -> dict[str, set[st
 def _over_fields(energy: Energy, fields: dict[str, Branch], said: dict[str, set[str]]) -> bool:
     """Whether an energy is a function of own variables of branches without a law, each at its own indices."""
     function = STATE_FUNCTIONS[energy.function]
-    unknowns = [n for n in ex.variables(energy.expression) if n.op == "var" and not _held(n, function)]
+    unknowns = [n for n in ex.variables(energy.expression) if n.op == "var" and not _is_parameter(n, function)]
     if not unknowns or any(n.data[1:] != (f"b{function.own}", 0) or n.data[0] not in fields for n in unknowns):
         return False
     branches = [fields[n.data[0]] for n in unknowns]
@@ -171,7 +174,7 @@ def _over_fields(energy: Energy, fields: dict[str, Branch], said: dict[str, set[
     return placed and all(said[b.name] == {function.name} for b in branches)
 
 
-def _closed(
+def _closed_statements(
     network: Network, chosen: Iterable[Energy], fields: dict[str, Branch], said: dict[str, set[str]]
 ) -> list[Energy]:
     """Statements all of whose branches stand in such statements only."""
@@ -185,7 +188,7 @@ def _closed(
         kept = rest
 
 
-def _joined(energies: Iterable[Energy]) -> list[Energy]:
+def _merge_by_branches(energies: Iterable[Energy]) -> list[Energy]:
     """Those that share branches as one sum each: what these hold is its transform."""
     found: list[Energy] = []
     for e in energies:
@@ -205,7 +208,7 @@ def _with_law(branch: Branch, energies: list[Energy]) -> Branch:
     return replace(branch, kind=function.edge, side=function.conjugate, law=law, stated=stated, energy=energy)
 
 
-def _kept(energy: Energy) -> Energy:
+def _stored_function(energy: Energy) -> Energy:
     """What stores of several branches hold: T or V, also where their transform is written."""
     function = STATE_FUNCTIONS[energy.function]
     held = energy.expression

@@ -23,25 +23,28 @@ from sysdyn.dsl.model.units import NONE, Unit, si
 def as_relations(network: Network) -> Network:
     """The network without reactions of what sticks; one without such is handed on as it is."""
     labels = {s.label for s in network.switches if s.kind == "friction" and not s.element}
+    # contents over nodes first become branches
     for row in [c for c in network.constraints if c.name in labels]:
         network = _between_nodes(network, row)
     frictions = [s for s in network.switches if s.kind == "friction" and s.sense is not None]
     if not frictions:
         return network
+    # senses that the contact sets: each becomes an unknown within its bound
     owners = {s.sense.data: s.label for s in frictions if s.sense is not None}
     own = [p for p in network.parameters if p.name in owners]
     efforts = _efforts(network, set(owners))
 
-    def freed(root: Node) -> Node:
+    # c*sense becomes c*unknown, or the unknown itself where it is an effort
+    def with_set_values(root: Node) -> Node:
         for n in _senses(root, owners):
             unknown = ex.var(_set(n.data), "e", *n.args)
             alone = ex.substitute(root, {n: ex.const(0.0)})
             root = ex.add(alone, unknown) if n.data in efforts else ex.substitute(root, {n: unknown})
         return root
 
-    found = rewritten(network, freed)
+    found = rewritten(network, with_set_values)
     said = {o.name: o.expression for o in found.observations}
-    given = dict(pair for s in frictions for pair in _watched(s, said, efforts))
+    given = dict(pair for s in frictions for pair in _watched_friction(s, said, efforts))
     senses = {label: iter([name for name, other in owners.items() if other == label]) for label in owners.values()}
     return replace(
         found,
@@ -67,12 +70,14 @@ def _coefficient(root: Node, sense: Node) -> Node:
 def _efforts(network: Network, names: set[str]) -> dict[str, tuple[Branch, Node]]:
     """The branch and the c of senses that stand in nothing but c*sense, its effort."""
     found = {}
+    # c*sense as the only such term of a branch's law
     for branch in network.branches:
         law = branch.law or ex.const(0.0)
         for n in _senses(law, names):
             c = _coefficient(law, n)
             if n.args == loop_indices(branch.loops) and not _senses(c, names):
                 found[n.data] = branch, c
+    # and nowhere with another factor
     for root in expressions(network, *EXPRESSIONS):
         for n in _senses(root, names):
             if n.data in found and _coefficient(root, n) is not _factor(found[n.data], n.args):
@@ -89,13 +94,15 @@ def _factor(effort: tuple[Branch, Node], at: tuple[Node, ...]) -> Node:
 def _between_nodes(network: Network, row: Constraint) -> Network:
     """The network with the dry friction of a content over nodes as a branch between them; row: its psi u = 0."""
     mine = [s for s in network.switches if s.label == row.name]
+    # friction of flows of nodes alone
     flows = sorted((n for n in ex.variables(row.expression) if n.op == "var"), key=lambda n: n.number)
     if not flows or flows[0].data[1:] != ("nf", 0):
         return network
     senses = {s.sense.data for s in mine if s.sense is not None}
     sign, nodes = derivative(row.expression, flows[0]), {n.name: n.domain for n in network.nodes}
+    # the content that holds the friction, split in two
     for k, energy in enumerate(network.energies):
-        rest = _without(energy, senses)
+        rest = _without_friction(energy, senses)
         if energy.function != "D" or rest is energy.expression:
             continue
         part = replace(energy, expression=ex.sub(energy.expression, rest))
@@ -103,6 +110,7 @@ def _between_nodes(network: Network, row: Constraint) -> Network:
         if branch is None:
             return network
 
+        # the flow of the new branch in the place of the combination of nodes
         def flow(at: tuple[Node, ...], order: int = 0, name: str = branch.name) -> Node:
             return ex.mul(sign, ex.var(name, "bf", *at, order=order))
 
@@ -119,7 +127,7 @@ def _between_nodes(network: Network, row: Constraint) -> Network:
     return network
 
 
-def _without(energy: Energy, senses: set[str]) -> Node:
+def _without_friction(energy: Energy, senses: set[str]) -> Node:
     """A content without its friction: the terms with one of these senses."""
     found = [n for n in ex.topological([energy.expression]) if n.op == "param" and n.data in senses]
     return ex.substitute(energy.expression, dict.fromkeys(found, ex.const(0.0))) if found else energy.expression
@@ -147,7 +155,7 @@ def _row(c: Constraint, sense: str, efforts: Mapping[str, tuple[Branch, Node]]) 
     return replace(c, kind="gamma", name=_set(sense), at=at, expression=ex.conditional(sticks, c.expression, slips))
 
 
-def _watched(s: Switch, said: Mapping[str, Node], efforts: Container[str]) -> Iterator[tuple[str, Node]]:
+def _watched_friction(s: Switch, said: Mapping[str, Node], efforts: Container[str]) -> Iterator[tuple[str, Node]]:
     """What events read of a friction: its effort, and what that lacks to c on both sides."""
     assert s.sense is not None
     bound, effort = said[s.bound or ""], ex.var(_set(s.sense.data), "e", *s.sense.args)

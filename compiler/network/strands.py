@@ -29,8 +29,8 @@ class Strand:
     branches: tuple[tuple[Branch, bool], ...]
     nodes: tuple[str | None, ...]
 
-    def reversed(self) -> Strand:
-        """The same the other way round."""
+    def reverse(self) -> Strand:
+        """The strand the other way round."""
         return Strand(tuple((b, not sense) for b, sense in reversed(self.branches)), self.nodes[::-1])
 
 
@@ -56,6 +56,7 @@ class _Graph:
         self.loose: dict[str, Branch] = {}
         self.at: dict[str, list[Branch]] = {}
         self.parts = Joined[str]()
+        # loose branches: of a law with a number, at a node that nothing else reads
         for b in network.branches:
             ends = [end for end in (b.plus, b.minus) if end is not None]
             names = [end.node for end in ends if end.node is not None]
@@ -86,7 +87,7 @@ class _Graph:
             ahead, behind = self._way(b, sense=True), self._way(b, sense=False)
             seen |= {c.name for c, _ in (*ahead[0], *behind[0])}
             if ahead[1][-1] not in self.joints:
-                back = Strand(*behind).reversed()
+                back = Strand(*behind).reverse()
                 yield Strand((*back.branches[:-1], *ahead[0]), (*back.nodes[:-2], *ahead[1]))
 
     def _way(self, b: Branch, *, sense: bool) -> tuple[tuple[tuple[Branch, bool], ...], tuple[str | None, ...]]:
@@ -138,6 +139,7 @@ def strands(network: Network, laws: Laws, taken: Collection[str]) -> Strands:
         for way in ways
     ]
     of = _buses(network, graph, ways)
+    # buses that too few strands end at are dropped until nothing changes
     while True:
         size = Counter(of.values())
         of = {name: key for name, key in of.items() if size[key] >= RUN}
@@ -148,6 +150,7 @@ def strands(network: Network, laws: Laws, taken: Collection[str]) -> Strands:
         if not lost:
             break
         of = {name: key for name, key in of.items() if key not in lost}
+    # what is left, by class
     buses: dict[str, list[str]] = {}
     for name, key in of.items():
         buses.setdefault(key, []).append(name or "")
@@ -184,6 +187,6 @@ def _classes(ways: Sequence[tuple[Strand, Links]], of: Mapping[str | None, str])
         key: object = (links, (one, two))
         back = tuple((not sense, law) for sense, law in reversed(links)), (two, one)
         if back < (links, (one, two)):
-            key, way = back, way.reversed()
+            key, way = back, way.reverse()
         found.setdefault(key, []).append(way)
     return tuple(tuple(same) for same in found.values() if len(same) >= RUN)

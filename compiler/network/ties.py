@@ -82,18 +82,23 @@ def _with_junction(
     """The constraint as transformers into a junction, a flow source in it where something stands beside."""
     domains = {n.name: n.domain for n in network.nodes} | {b.name: b.domain for b in network.branches}
     known = [domains[n.data[0]] for n, _ in sides]
+    # the junction has the domain whose flow the constraint relates
     domain = next((d for d in known if d.flow.dimension == c.unit.dimension), known[0])
     others: list[tuple[str, Node | None]] = [(f"{c.name}#{2 * k}", None) for k in range(1, len(sides) + 1)]
     others += [] if ex.is_const(beside, 0.0) else [(f"{c.name}#0", beside)]
     ends, nodes = _junction(c, domain, len(others))
     made = [_branch(c, name, domain, *two, flow) for (name, flow), two in zip(others, ends, strict=True)]
     couplings, branches = [], {b.name: b for b in network.branches if any(n.data[0] == b.name for n, _ in sides)}
+    # a transformer for each flow of the constraint
     for k, (n, factor) in enumerate(sides):
         name, own = f"{c.name}#{2 * k + 1}", branches.get(n.data[0])
+        # a node: a branch to ground beside it
         if own is None:
             made.append(_branch(c, name, known[k], Terminal(n.data[0], n.args), Terminal(None, ())))
+        # a branch without law is the port itself
         elif own.name in bare:
             name, branches[own.name] = own.name, replace(own, kind="port")
+        # in series with the branch at an effort node, beside it at a flow node
         else:
             plus = own.plus
             if own.domain.common == "effort":
@@ -104,14 +109,15 @@ def _with_junction(
         at = loop_indices(c.loops)
         couplings.append(Coupling("transformer", name, others[k][0], at, c.loops, "e", ex.neg(factor), c.place))
 
-    def felt(root: Node) -> Node:
+    def multipliers_as_efforts(root: Node) -> Node:
         named = (n for n in ex.topological([root]) if n.op == "var" and n.data[0] == c.name)
         read = [n for n in named if n.data[1] in ("kappa", "mu")]
         return ex.substitute(root, {n: ex.neg(ex.var(others[0][0], "be", *n.args)) for n in read}) if read else root
 
+    # a displacement constraint holds at the start too
     begun = (Initial(c.expression, ex.const(0.0), True, c.loops, c.place),) if c.kind == "phi" else ()
     kept = tuple(branches.get(b.name, b) for b in network.branches)
-    network = rewritten(replace(network, branches=kept), felt)
+    network = rewritten(replace(network, branches=kept), multipliers_as_efforts)
     return replace(
         network,
         initials=(*network.initials, *begun),

@@ -18,7 +18,7 @@ from sysdyn.dsl.model.network import Constraint, Network
 from sysdyn.dsl.text.diagnostics import ModelError
 
 
-def grounded(network: Network) -> Network:
+def add_references(network: Network) -> Network:
     """The network with a flow constraint `node.reference` of its reflection for each such part."""
     if all(n.domain.common == "flow" for n in network.nodes):
         return network

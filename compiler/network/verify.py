@@ -24,9 +24,11 @@ def verify_network(network: Network, *, coordinates: bool = False) -> None:
     families = _families(network)
     for what, loops, roots in _statements(network):
         inside = {loop.index for loop in loops}
+        # loop variables of reductions
         for node in topological(roots):
             if node.op == "reduce":
                 inside.add(node.data[1])
+        # indices are bound, variables declared with as many indices
         for node in topological(roots):
             if node.op == "index" and node.data not in inside:
                 raise BrokenNetworkError(f"{what}: index {node.data} belongs to no loop")
@@ -91,10 +93,12 @@ def _ends(network: Network, coordinates: bool) -> None:
     for node in network.nodes:
         domains.setdefault(node.name, set()).add(node.domain.name)
     names = {b.name for b in network.branches}
+    # both ends at nodes of the branch's domain
     for b in network.branches:
         for end in (b.plus, b.minus):
             if end is not None and end.node is not None and b.domain.name not in domains.get(end.node, ()):
                 raise BrokenNetworkError(f"branch {b.name}: no node {end.node} of {b.domain.name}")
+    # couplings between branches that are there
     for c in network.couplings:
         if not {c.first, c.second} <= names:
             raise BrokenNetworkError(f"{c.kind} {c.first}, {c.second}: one of them is no branch")

@@ -85,7 +85,7 @@ def _group(command: tuple[str, ...], streams: Mapping[str, Any]) -> Iterator[sub
         run.wait()
 
 
-def _said(command: tuple[str, ...]) -> tuple[int, str]:
+def _run_command(command: tuple[str, ...]) -> tuple[int, str]:
     """The status of a compiler's command and what it said; NoCompilerError where it cannot be run, or does not end.
 
     Its words go to a file: what it leaves running holds no pipe open that would be waited for.  They may be in any
@@ -107,7 +107,7 @@ def _said(command: tuple[str, ...]) -> tuple[int, str]:
 
 def _runs(command: tuple[str, ...]) -> None:
     """Raises NoCompilerError where what is called a compiler is none."""
-    status, said = _said((*command, "--version"))
+    status, said = _run_command((*command, "--version"))
     if status:
         raise NoCompilerError(f"{' '.join(command)} --version fails with status {status}", said)
 
@@ -156,7 +156,7 @@ def _compile(command: tuple[str, ...], text: str, folder: Path, key: str) -> Pat
     with tempfile.TemporaryDirectory(dir=folder, prefix="build-") as place:
         source, output = Path(place) / "model.c", Path(place) / "model.so"
         source.write_text(text, encoding="ascii")
-        status, said = _said((*command, "-o", str(output), str(source), "-lm"))
+        status, said = _run_command((*command, "-o", str(output), str(source), "-lm"))
         if status:
             raise BuildError(f"the C compiler failed with status {status}", said)
         return cache_.put(output, key)

@@ -33,17 +33,17 @@ def folder() -> Path:
 
     Where it cannot be made, or others could put a library into it, a folder for this process takes its place.
     """
-    asked = wanted()
+    asked = requested_folder()
     try:
         asked.mkdir(mode=0o700, parents=True, exist_ok=True)
         real = asked.resolve(strict=True)
-        private = _mine(real.stat()) and _trusted(real.parent.stat())
+        private = _mine(real.stat()) and _is_trusted(real.parent.stat())
     except OSError:
         return folder_of_process()
     return asked if private and os.access(asked, os.W_OK) else folder_of_process()
 
 
-def wanted() -> Path:
+def requested_folder() -> Path:
     """The folder that the environment asks for."""
     own = os.environ.get("SYSDYN_CACHE")
     base = os.environ.get("XDG_CACHE_HOME") or str(Path("~").expanduser() / ".cache")
@@ -65,7 +65,7 @@ def _mine(found: os.stat_result) -> bool:
     return found.st_uid == os.getuid() and not found.st_mode & 0o022
 
 
-def _trusted(parent: os.stat_result) -> bool:
+def _is_trusted(parent: os.stat_result) -> bool:
     """Nobody but this user and root can put another folder in its place."""
     if not hasattr(os, "getuid"):
         return True

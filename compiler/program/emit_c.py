@@ -17,7 +17,7 @@ from sysdyn.compiler.program.emit_c_rolled import Rolled
 from sysdyn.compiler.program.emit_c_support import APART, HEAD, SUPPORT, TURNS
 from sysdyn.compiler.program.notation import Notation, bound, factors, number, position, total
 from sysdyn.compiler.program.program import Assign, Fold, Operand, Program, Routine, Statement, Store
-from sysdyn.compiler.program.sharing import shared
+from sysdyn.compiler.program.sharing import share_operations
 
 C = Notation("sqrt", "pow", "sd_whole", "INFINITY", "NAN")
 
@@ -38,11 +38,11 @@ _BOOLEAN = ("cmp", "and", "or", "not")
 def emit_c(program: Program, form: DescriptorForm, head: str = HEAD) -> str:
     """The C text of a program; head: what declares the contract's frame."""
     angles = _Angles()
-    turned = {k: found for k, routine in enumerate(program.routines) if (found := angles.of(routine))}
+    turned = {k: found for k, routine in enumerate(program.routines) if (found := angles.angle_numbers(routine))}
     rolled = Rolled(_ARGUMENTS, _PASSED)
     kept = {k for k, found in turned.items() if RARE * len(found) > len(program.routines[k].body)}
     rolled.outputs(program, _printer, kept)
-    left = {k: shared(r) for k, r in enumerate(program.routines) if k not in rolled.calls}
+    left = {k: share_operations(r) for k, r in enumerate(program.routines) if k not in rolled.calls}
     inside = {k: _inside(r, turned.get(k, {})) for k, r in left.items()}
     rolled.loops(program, {k: inside[k] for k, r in left.items() if r.loops})
     number = Counter((routine.block, routine.part) for routine in program.routines)
@@ -80,7 +80,7 @@ class _Angles:
         """How many there are."""
         return len(self._numbers)
 
-    def of(self, routine: Routine) -> dict[int, int]:
+    def angle_numbers(self, routine: Routine) -> dict[int, int]:
         """Numbers of the angles by the target of each sine and cosine of a routine: where loops go round there are as
         many angles as turns, and none is kept.
         """
@@ -183,8 +183,9 @@ class _Writer:
         lines: list[str] = []
         for s in statements:
             match s:
+                # an angle of which both sine and cosine are read is turned once
                 case Assign() if s.target in self.angles:
-                    lines += [f"{indent}{line}" for line in self.turned(s)]
+                    lines += [f"{indent}{line}" for line in self.sine_or_cosine(s)]
                 case Assign():
                     kind = "int" if s.op in _BOOLEAN else "double"
                     lines.append(f"{indent}const {kind} a{s.target} = {self.value(s)};")
@@ -208,7 +209,7 @@ class _Writer:
                 left += makers[target].args
         return sorted(self.routine.body, key=lambda s: not (isinstance(s, Assign) and s.target in first))
 
-    def turned(self, s: Assign) -> list[str]:
+    def sine_or_cosine(self, s: Assign) -> list[str]:
         """Sine or cosine of an angle that is kept."""
         k = self.angles[s.target]
         lines = [f"const double a{s.target} = w{k}->{_OF_ANGLES[s.data]};"]
@@ -250,9 +251,9 @@ class _Writer:
         """The position of an element in y, yd (table at) or r (table to)."""
         self.used.add(table)
         fixed, moving = position(place, f"{table}[{place.family}]", _loop, True)
-        return self._joined(fixed, moving)
+        return self._add_offset(fixed, moving)
 
-    def _joined(self, fixed: str, moving: str) -> str:
+    def _add_offset(self, fixed: str, moving: str) -> str:
         if "ix[" in fixed:
             self.used.add("ix")
             if self.routine.loops:
@@ -269,20 +270,23 @@ class _Writer:
         """The right-hand side of an assignment."""
         args = [_operand(a) for a in s.args]
         match s.op:
+            # unknowns and their rates by place
             case "y" | "yd":
                 self.used.add(s.op)
                 return f"{s.op}[{self.place(s.data, 'at')}]"
+            # a scalar parameter; arrays by element
             case "p":
                 self.used.add("p")
                 return f"p[{s.data}]"
             case "element":
                 self.used.update(("p", "ix"))
-                return f"p[{self._joined(*position(s.data, '', _loop, True))}]"
+                return f"p[{self._add_offset(*position(s.data, '', _loop, True))}]"
             case "time":
                 self.used.add("t")
                 return "t"
             case "index":
                 return f"(double){_loop(s.data)}"
+            # without factors of one and signs of minus
             case "sum":
                 return total(s.data, args, C)
             case "mul":

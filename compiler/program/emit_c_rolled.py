@@ -17,12 +17,12 @@ from sysdyn.compiler.program.rolled import (
     TERMS,
     Group,
     Sum,
-    apart,
+    as_long_sum,
     group,
-    repeated,
+    normalize_signs,
+    repeated_places,
     skeleton,
-    summed,
-    unsigned,
+    split_outputs,
 )
 
 Printed = Callable[[Sequence[Statement]], str]
@@ -51,15 +51,17 @@ class Rolled:
         """Take outputs that are alike of kernels without loops; kept: routines that stay as they are."""
         for _, found in groupby(enumerate(program.routines), _kernel):
             kernel = dict(found)
+            # short kernels gain nothing
             if sum(len(r.body) for r in kernel.values()) < LARGE:
                 continue
-            sums = repeated(kernel.values())
+            sums = repeated_places(kernel.values())
             single: dict[int, list[Split]] = {}
             for k, routine in kernel.items():
-                outputs = None if k in kept else apart(routine)
+                outputs = None if k in kept else split_outputs(routine)
                 if outputs is None:
                     continue
                 printed = printer(routine)
+                # several terms into one place: the order of the sum is kept
                 if any(isinstance(s, Store) and s.place in sums for s in routine.body):
                     self._in_order(k, routine, outputs, printed)
                 else:
@@ -74,11 +76,12 @@ class Rolled:
             alike.setdefault((_out(program.routines[k]), key), []).append((k, numbers))
         for (out, key), found in alike.items():
             if len(found) >= SHARED:
-                self._shared(program, out, group(key, [numbers for _, numbers in found]), [k for k, _ in found])
+                self._write_shared(program, out, group(key, [numbers for _, numbers in found]), [k for k, _ in found])
 
-    def _shared(self, program: Program, out: str, alike: Group, numbers: list[int]) -> None:
+    def _write_shared(self, program: Program, out: str, alike: Group, numbers: list[int]) -> None:
+        """Write one function for loops that are alike but for numbers, and a call with its tables for each of them."""
         name = f"g{len(self.texts)}"
-        head, tables = self._named(alike)
+        head, tables = self._table_names(alike)
         kind = "void " if out == "r" else "double *"
         extra = "".join(f", const {_KINDS[letter]} *restrict {letter}" for letter in head)
         first = program.routines[numbers[0]]
@@ -102,10 +105,10 @@ class Rolled:
         outputs = [output for k in taken for output in single[k]]
         loops = _rows(output for output in outputs if output[0] in often)
         texts = [group(key, [numbers]).text for key, numbers in outputs if key not in often]
-        signed = [skeleton(unsigned(text)) for text in texts]
+        signed = [skeleton(normalize_signs(text)) for text in texts]
         more = {key: rows for key, rows in _rows(signed).items() if len(rows) >= ALIKE}
         rest = [_block(text) for text, (key, _) in zip(texts, signed, strict=True) if key not in more]
-        found = [self._turned(routine, group(key, rows)) for key, rows in (*loops.items(), *more.items())]
+        found = [self._write_turns(routine, group(key, rows)) for key, rows in (*loops.items(), *more.items())]
         pieces = [rest[k : k + ROWS_A_ROUTINE] for k in range(0, len(rest), ROWS_A_ROUTINE)]
         found += [self._function(routine, "the rest", piece, []) for piece in pieces]
         self.calls |= dict.fromkeys(taken, ())
@@ -113,7 +116,7 @@ class Rolled:
 
     def _in_order(self, k: int, routine: Routine, outputs: Sequence[Sequence[Statement]], printed: Printed) -> None:
         """A routine whose sums are long: loops over terms that are alike, in the order of the terms."""
-        sums = [summed(output) for output in outputs]
+        sums = [as_long_sum(output) for output in outputs]
         if not any(sums):
             return
         body, tables = [], []
@@ -130,6 +133,7 @@ class Rolled:
         self.calls[k] = (self._function(routine, "long sums", body, tables),)
 
     def _terms(self, found: Sum, printed: Printed) -> Iterator[tuple[str, list[str]]]:
+        """Terms of a long sum as text: alike neighbours as turns of a loop, others one by one."""
         split = []
         for c, statements in found.terms:
             factor = "" if abs(c) == 1.0 else f"{abs(c)!r}*"
@@ -142,19 +146,19 @@ class Rolled:
             else:
                 yield from ((_block(group(key, [numbers]).text), []) for numbers in rows)
 
-    def _turned(self, routine: Routine, alike: Group) -> str:
+    def _write_turns(self, routine: Routine, alike: Group) -> str:
         text, tables = self._turns(alike)
         return self._function(routine, f"{alike.count} that are alike", [text], tables)
 
     def _turns(self, alike: Group) -> tuple[str, list[str]]:
         """A loop through the tables of a group, and these."""
-        head, tables = self._named(alike)
+        head, tables = self._table_names(alike)
         lines = [f"    const {_KINDS[letter]} *restrict {letter} = {table};" for letter, (table, _) in head.items()]
         steps = "".join(f", {letter} += {width}" for letter, (_, width) in head.items())
         lines += [f"    for (int turn = 0; turn < {alike.count}; ++turn{steps}) {{", alike.text, "    }"]
         return "\n".join(["    {", *lines, "    }"]), tables
 
-    def _named(self, alike: Group) -> tuple[dict[str, tuple[str, int]], list[str]]:
+    def _table_names(self, alike: Group) -> tuple[dict[str, tuple[str, int]], list[str]]:
         """Names and widths of a group's tables by their letter in its text, and their texts."""
         head, tables = {}, []
         for letter, rows in (("n", alike.whole), ("d", alike.real)):

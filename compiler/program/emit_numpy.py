@@ -189,7 +189,7 @@ class _Writer:
         if not isinstance(s.place, Reference):
             return f"v[:, {s.place}] = {value}" if self.depth else f"v[o + {s.place}] = {value}"
         where, kind = self.where(s.place, f"to[{s.place.family}]")
-        if kind == "array" and self._apart(s.place):
+        if kind == "array" and self._has_distinct_places(s.place):
             return f"r[{where}] += {value}"
         if kind == "array":
             return f"_add(r, {where}, {value})"
@@ -197,7 +197,7 @@ class _Writer:
             return f"r[{where}] += np.sum(np.broadcast_to({value}, (n,)))"
         return f"r[{where}] += {value}"
 
-    def _apart(self, place: Reference) -> bool:
+    def _has_distinct_places(self, place: Reference) -> bool:
         """Whether no two iterations have one place: each loop moves an index of its own."""
         if any(index.table >= 0 for index in place.indices):
             return False
@@ -236,6 +236,7 @@ class _Writer:
         """The right-hand side of an assignment."""
         args = [_operand(a) for a in s.args]
         match s.op:
+            # as in C, over all iterations at once
             case "y" | "yd":
                 return f"{s.op}[{self.where(s.data, f'at[{s.data.family}]')[0]}]"
             case "p":

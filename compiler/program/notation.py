@@ -68,15 +68,19 @@ def _power(base: str, exponent: float, notation: Notation) -> str:
 def position(place: Reference | Element, head: str, loop: Callable[[int], str], scaled: bool) -> tuple[str, str]:
     """(part that no loop variable enters, part with loop variables) of a place in y, r or p."""
     fixed = [head] if head else []
+    # the family's first place
     if place.origin >= 0:
         fixed.append(f"ix[{place.origin}]")
     moving = []
+    # each index by its stride
     for k, index in enumerate(place.indices):
         stride = f"ix[{place.strides[k]}]" if k < len(place.strides) else ""
+        # picked by a table
         if index.table >= 0:
             picked = f"ix[ix[{index.table}] + {bound(index, loop)}]"
             moving.append(f"{stride}*{picked}" if stride and scaled else picked)
             continue
+        # constants and slots before loop variables
         still = still_part(index)
         if still:
             fixed.append(f"{stride}*({still})" if stride else still)

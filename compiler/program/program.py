@@ -265,17 +265,21 @@ class _Body:
         return Fold(self._next(), operator, own, *bounds, body, scope[inner])
 
     def _assign(self, node: Node, values: dict[Node, Operand]) -> Assign:
+        """Assignment of a node's value; unknowns, parameters and indices by their places."""
         integers = self.programmer.integers
         op, data, args = node.op, node.data, node.args
+        # y or y' by place
         if op == "var":
             reference = self.programmer.reference(node, self.loops)
             return Assign(self._next(), "yd" if data[2] else "y", reference, ())
+        # a number of its own, or an element of an array
         if op == "param":
             if args or data not in self.programmer.scalars:  # the constant of an integrated row lies among the arrays
                 return Assign(self._next(), "element", integers.element(data, args, self.loops), ())
             return Assign(self._next(), "p", self.programmer.scalars[data], ())
         if op == "index":
             return Assign(self._next(), "index", self.loops[data], ())
+        # operations on values that are there
         operands = tuple(values[a] for a in args)
         if op == "table":
             return Assign(self._next(), "table", self._table(data, len(args)), operands)

@@ -30,11 +30,13 @@ def _verify_body(body: tuple[Statement, ...], known: set[int], taken: set[int], 
     """`known`: values in scope; `taken`: every target so far; `depth`: number of loop variables in scope."""
     for statement in body:
         match statement:
+            # stores a value in scope; assigns none
             case Store():
                 _verify_operands((statement.value,), known)
                 if isinstance(statement.place, Reference):
                     _verify_indices(statement.place.indices, depth, slots)
                 continue
+            # its body sees what is outside, and hides what it assigns
             case Fold():
                 inner = set(known)
                 _verify_indices((statement.first, statement.last), depth, slots)
@@ -73,6 +75,7 @@ def show(program: Program) -> str:
 
 
 def _show_body(body: tuple[Statement, ...], indent: str) -> list[str]:
+    """Lines of statements, folds with their bodies indented."""
     lines = []
     for s in body:
         match s:

@@ -58,7 +58,7 @@ def skeleton(text: str, *, whole: bool = False) -> tuple[str, tuple[str, ...]]:
     return pattern.sub("@", text), tuple(pattern.findall(text))
 
 
-def unsigned(text: str) -> str:
+def normalize_signs(text: str) -> str:
     """The text with sums of products with numbers alone, which differ where terms were added or taken away; the same
     values to the last bit.
     """
@@ -84,21 +84,21 @@ def group(key: str, rows: Sequence[tuple[str, ...]]) -> Group:
     return Group("".join(text), len(rows), whole, real)
 
 
-def apart(routine: Routine) -> list[tuple[Statement, ...]] | None:
+def split_outputs(routine: Routine) -> list[tuple[Statement, ...]] | None:
     """The statements of each output by itself, its values numbered from 0; None where more than sums and products
     would be computed twice, or where it is loops.
     """
     if routine.loops or any(isinstance(s, Fold) for s in routine.body):
         return None
     made = {s.target: s for s in routine.body if isinstance(s, Assign)}
-    outputs = [(s, _needed([s.value], made)) for s in routine.body if isinstance(s, Store)]
+    outputs = [(s, _needed_assignments([s.value], made)) for s in routine.body if isinstance(s, Store)]
     uses = Counter(target for _, needed in outputs for target in needed)
     if any(count > 1 and made[target].op not in _CHEAP for target, count in uses.items()):
         return None
-    return [(*_numbered(needed, made), _store(s, needed)) for s, needed in outputs]
+    return [(*_renumber(needed, made), _store(s, needed)) for s, needed in outputs]
 
 
-def summed(output: Sequence[Statement]) -> Sum | None:
+def as_long_sum(output: Sequence[Statement]) -> Sum | None:
     """An output as a long sum; None where it is none, or terms share more than sums and products."""
     store = output[-1]
     made = {s.target: s for s in output if isinstance(s, Assign)}
@@ -106,22 +106,22 @@ def summed(output: Sequence[Statement]) -> Sum | None:
     total = made.get(store.value) if isinstance(store.value, int) else None
     if total is None or total.op != "sum" or len(total.args) < TERMS:
         return None
-    needs = [_needed([a], made) for a in total.args]
+    needs = [_needed_assignments([a], made) for a in total.args]
     uses = Counter(target for needed in needs for target in needed)
     if not all(needs) or any(count > 1 and made[target].op not in _CHEAP for target, count in uses.items()):
         return None
     constant, coefficients = total.data
-    terms = tuple((c, _numbered(needed, made)) for c, needed in zip(coefficients, needs, strict=True))
+    terms = tuple((c, _renumber(needed, made)) for c, needed in zip(coefficients, needs, strict=True))
     return Sum(constant, terms, Store(store.place, -1))
 
 
-def repeated(routines: Iterable[Routine]) -> set[object]:
+def repeated_places(routines: Iterable[Routine]) -> set[object]:
     """Places to which the routines add more than once: the order of these sums is kept."""
     places = Counter(s.place for r in routines for s in r.body if isinstance(s, Store))
     return {place for place, count in places.items() if count > 1}
 
 
-def _needed(roots: Sequence[Operand], made: dict[int, Assign]) -> dict[int, int]:
+def _needed_assignments(roots: Sequence[Operand], made: dict[int, Assign]) -> dict[int, int]:
     """Numbers of the assignments behind these values: what is needed first comes first; with numbers of their own."""
     found: dict[int, int] = {}
     stack = [(root, False) for root in reversed(roots) if isinstance(root, int)]
@@ -137,7 +137,7 @@ def _needed(roots: Sequence[Operand], made: dict[int, Assign]) -> dict[int, int]
     return found
 
 
-def _numbered(needed: dict[int, int], made: dict[int, Assign]) -> tuple[Assign, ...]:
+def _renumber(needed: dict[int, int], made: dict[int, Assign]) -> tuple[Assign, ...]:
     found = []
     for target, own in needed.items():
         s = made[target]

@@ -23,9 +23,9 @@ LARGEST = 2.0**16
 _READ = frozenset(("y", "yd", "p", "element", "time", "index"))
 
 
-def shared(routine: Routine) -> Routine:
-    """The same values but for round-off, in fewer operations."""
-    return replace(routine, body=_used(_factored(_Scaled(routine.body).body)))
+def share_operations(routine: Routine) -> Routine:
+    """A routine of the same values but for round-off, in fewer operations."""
+    return replace(routine, body=_drop_unused(_share_factors(_Scaled(routine.body).body)))
 
 
 def _binary(value: float) -> bool:
@@ -46,28 +46,31 @@ class _Scaled:
             self._take(s)
 
     def _take(self, s: Statement) -> None:
+        """Take over a statement: sums and products scaled, others with whole values."""
         match s:
             case Assign(op="sum"):
                 self._sum(s)
             case Assign(op="mul"):
                 self._product(s)
+            # reads have no arguments
             case Assign() if s.op in _READ:
                 self.body.append(s)
             case Assign():
                 self.body.append(replace(s, args=tuple(map(self._whole, s.args))))
             case Store():
                 self.body.append(replace(s, value=self._whole(s.value)))
+            # a fold reads values under their own numbers
             case Fold():
                 for target in _read(s):
                     self._keep(target)
                 self.body.append(s)
 
-    def _apart(self, value: Operand) -> tuple[float, Operand]:
+    def _scale_of(self, value: Operand) -> tuple[float, Operand]:
         return self._scale.get(value, (1.0, value)) if isinstance(value, int) else (1.0, value)
 
     def _whole(self, value: Operand) -> Operand:
         """The value itself, made where it is only known by another."""
-        scale, own = self._apart(value)
+        scale, own = self._scale_of(value)
         return own if scale == 1.0 else self._make("sum", (0.0, (scale,)), (own,))
 
     def _keep(self, target: int) -> None:
@@ -91,13 +94,15 @@ class _Scaled:
             self._scale[target] = scale, own
 
     def _sum(self, s: Assign) -> None:
+        """A sum by its first coefficient: a + b and -2 a - 2 b share one operation."""
         constant, given = s.data
-        parts = [self._apart(a) for a in s.args]
+        parts = [self._scale_of(a) for a in s.args]
         coefficients = [c * scale for c, (scale, _) in zip(given, parts, strict=True)]
         args = tuple(own for _, own in parts)
         first = coefficients[0]
         alike = not constant and _binary(first) and len({abs(c) for c in coefficients}) == 1
         scale = first if alike else math.copysign(1.0, first)
+        # 2 x is x, scaled
         if len(args) == 1 and alike and isinstance(args[0], int):
             self._is(s.target, first, args[0])
             return
@@ -105,10 +110,12 @@ class _Scaled:
         self._is(s.target, scale, self._make("sum", data, args, s.target))
 
     def _product(self, s: Assign) -> None:
+        """A product without the powers of two in its factors."""
         scale, args = 1.0, []
         for exponent, value in zip(s.data, s.args, strict=True):
-            factor, own = self._apart(value)
+            factor, own = self._scale_of(value)
             power = factor**exponent if exponent == int(exponent) else 0.0
+            # powers of two are exact: they move into the scale
             if _binary(power) and _binary(scale * power):
                 scale *= power
                 args.append(own)
@@ -117,7 +124,7 @@ class _Scaled:
         self._is(s.target, scale, self._make("mul", tuple(s.data), tuple(args), s.target))
 
 
-def _factored(body: Sequence[Statement]) -> list[Statement]:
+def _share_factors(body: Sequence[Statement]) -> list[Statement]:
     """The pairs of factors that most products share are made once, and the pairs of what is left then."""
     products = [s for s in body if isinstance(s, Assign) and s.op == "mul"]
     factors = {s.target: _factors(s) for s in products}
@@ -156,6 +163,7 @@ def _pairs(factors: dict[int, list[int]], number: int) -> dict[int, tuple[int, i
     heap = [(-sum(at.values()), pair) for pair, at in where.items()]
     heapq.heapify(heap)
     new: dict[int, tuple[int, int]] = {}
+    # a heap with stale counts: an entry that is not up to date goes back
     while heap:
         count, pair = heapq.heappop(heap)
         now = sum(where[pair].values())
@@ -165,6 +173,7 @@ def _pairs(factors: dict[int, list[int]], number: int) -> dict[int, tuple[int, i
             heapq.heappush(heap, (-now, pair))
             continue
         touched: set[tuple[int, int]] = set()
+        # each product that holds the pair gets the new number in its place
         for target, times in list(where[pair].items()):
             own = factors[target]
             touched |= _note(where, target, own, remove=True)
@@ -228,7 +237,7 @@ def _targets(body: Sequence[Statement]) -> Iterable[int]:
             yield from _targets(s.body)
 
 
-def _used(body: Sequence[Statement]) -> tuple[Statement, ...]:
+def _drop_unused(body: Sequence[Statement]) -> tuple[Statement, ...]:
     """The statements without those whose value nobody reads."""
     found: list[Statement] = []
     used: set[int] = set()

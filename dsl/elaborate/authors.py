@@ -16,16 +16,16 @@ from sysdyn.dsl.text.diagnostics import Diagnostic, Place, Related
 from sysdyn.dsl.tree import syntax
 
 
-def told(elaborator: Elaborator, found: Iterable[Diagnostic]) -> Iterator[Diagnostic]:
+def point_at_author(elaborator: Elaborator, found: Iterable[Diagnostic]) -> Iterator[Diagnostic]:
     """The findings, those of a library at the author's place."""
     for d in found:
-        yield _told(elaborator, d) if d.place is not None and d.place.source is not elaborator.source else d
+        yield _point_at_author(elaborator, d) if d.place is not None and d.place.source is not elaborator.source else d
 
 
-def _told(elaborator: Elaborator, d: Diagnostic) -> Diagnostic:
+def _point_at_author(elaborator: Elaborator, d: Diagnostic) -> Diagnostic:
     """The finding at the author's own text, where a component of the library has its place."""
     assert d.place is not None
-    spaces = [s for s, _ in elaborator.bodies if s.path and _within(elaborator, s, d.place)]
+    spaces = [s for s, _ in elaborator.bodies if s.path and _contains(elaborator, s, d.place)]
     meant = [s for s in spaces if s.path == d.place.element]
     named = [s for s in spaces if re.search(rf"(?<![\w.]){re.escape(s.path)}(?![\w])", d.message)]
     for space in (*meant, *sorted(named, key=lambda s: -len(s.path)), *spaces):
@@ -36,7 +36,7 @@ def _told(elaborator: Elaborator, d: Diagnostic) -> Diagnostic:
     return d
 
 
-def _within(elaborator: Elaborator, space: Space, place: Place) -> bool:
+def _contains(elaborator: Elaborator, space: Space, place: Place) -> bool:
     """Whether a place lies in the text of a space's component."""
     if space.source != place.source:
         return False

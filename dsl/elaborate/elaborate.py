@@ -49,32 +49,36 @@ class Elaborator(Instances):
         self.source = files.file.source
         self.space = Space("", Scope(files.scope), files.scope, self.source, component=model.name.name)
         self._body = Body(flatten(model.body))
-        self.resolver.taken = self.taken
+        self.resolver.taken = self.effort_into
         self.resolver.discretes = self.parts.discretes
 
     def names(self) -> None:
         """Bring the model's names into scope; values of inputs may change until `elements`."""
         with self.entering(self.space):
-            for statement, _ in self._body.of(syntax.Broken):
+            for statement, _ in self._body.statements_of(syntax.Broken):
                 assert isinstance(statement, syntax.Broken)
                 self.scope.broken |= statement.names
             self.declare_parameters(self._body, {})
-            self.declare_all(self._body, self._declared, _ALONE)
+            self.declare_all(self._body, self._declare_statement, _ALONE)
             self.bodies.append((self.space, self._body))
 
-    def _declared(self, statement: syntax.Statement) -> None:
+    def _declare_statement(self, statement: syntax.Statement) -> None:
         """Statements that stand in components alone are refused in a model; the others declared."""
         match statement:
+            # `input u: N` of a model: what drives it from outside
             case syntax.Input():
                 self.model_input(statement)
+            # of components alone: whatever is outside connects to them, and outside of a model there is nothing
             case syntax.Port() | syntax.Branch():
                 what = "port" if isinstance(statement, syntax.Port) else "branch"
                 message = f"a model has no {what}: nothing could be connected to it"
                 raise self.resolver.fail("E408", message, statement.span, help="node, or a component")
+            # `e = R*f` needs the branch of a component whose law it is
             case syntax.Law():
                 raise self.resolver.fail("E303", "a law stands in a component with a branch", statement.span)
             case syntax.Level():
                 raise self.resolver.fail("E803", "levels belong to components", statement.span)
+            # param, coord, node, let, ...: in models as in components
             case _:
                 self.declare(statement)
 
@@ -82,7 +86,7 @@ class Elaborator(Instances):
         """Elaborate the model's instances and those inside them; their laws follow once sizes are set (`settle`)."""
         with self.entering(self.space):
             self.announce(self._body)
-        self._said(syntax.Law, self.law)
+        self._carry_out(syntax.Law, self.law)
 
     def settle(self) -> None:
         """The laws of all branches."""
@@ -110,28 +114,28 @@ class Elaborator(Instances):
     def statements(self) -> None:
         """Resolve what the model and its instances say: constraints first, which others may read."""
         self.resolver.complete = True
-        self._said(syntax.Constraint, self.constraint)
-        self.postponed()
+        self._carry_out(syntax.Constraint, self.constraint)
+        self.run_postponed()
         for space, body in self.bodies:
             if isinstance(space, Likeness):
                 required_of(self, space, body)
                 continue
-            kinds = {type(s) for s, _ in body.of(_STATED)}
+            kinds = {type(s) for s, _ in body.statements_of(_STATED)}
             if not kinds and all(type(s) is not Definition for s in space.scope.symbols.values()):
                 continue
             with self.entering(space):
                 for kind in (k for k in _STATED if k in kinds):
                     with nullcontext() if kind in _MOVING else self.resolver.aside():
-                        self.each(body.of(kind), partial(STATEMENTS[kind], self))
+                        self.each(body.statements_of(kind), partial(STATEMENTS[kind], self))
                 with self.resolver.aside():
                     self._definitions()
         self.resolver.said = True
         self.parts.derived = [Derived(node, *at) for node, at in self.resolver.derived.items()]
 
-    def _said(self, kind: type[syntax.Statement], do: Callable[..., None]) -> None:
+    def _carry_out(self, kind: type[syntax.Statement], do: Callable[..., None]) -> None:
         """Carry out all statements of a kind, in the bodies where they stand."""
         for space, body in self.bodies:
-            chosen = body.of(kind)
+            chosen = body.statements_of(kind)
             if chosen and isinstance(space, Likeness):
                 self.pending.append(Pending(space, space.mould.law.span, partial(law_of_cast, self, space)))
             elif chosen:
@@ -167,7 +171,7 @@ class Elaborator(Instances):
         change = {n: _between(fields[n.data[0]], n) for n in efforts if n.data[0] in kinetic & fields.keys()}
         return ex.substitute(power, change)
 
-    def derived(self) -> None:
+    def add_derivatives(self) -> None:
         """What branches along expressions differentiate by time, and integrals of these read."""
         parts = self.parts
         along = [(b, b.on) for b in parts.branches if b.on is not None]
@@ -176,7 +180,7 @@ class Elaborator(Instances):
         moved = [(b, on) for b, on in along if b.kind not in ("potential", "effort") or b.name in read]
         parts.derived += [Derived(on, b.loops, replace(b.place, element=b.name)) for b, on in moved]
 
-    def taken(self, space: Space, end: End, place: Place, *, rates: bool) -> ex.Node:
+    def effort_into(self, space: Space, end: End, place: Place, *, rates: bool) -> ex.Node:
         """What an instance takes in at an end; place: where that is read."""
         try:
             return conjugate_of(self.parts, space, end, rates=rates)

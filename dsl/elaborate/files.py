@@ -15,7 +15,7 @@ from sysdyn.dsl.elaborate.tables import read_table
 from sysdyn.dsl.model import dimensions as dim
 from sysdyn.dsl.model.dependence import in_order
 from sysdyn.dsl.model.network import Table
-from sysdyn.dsl.model.units import NONE, Unit, known, multiply, si
+from sysdyn.dsl.model.units import NONE, Unit, find_unit, multiply, si
 from sysdyn.dsl.names.calls import walk
 from sysdyn.dsl.names.failures import Failed
 from sysdyn.dsl.names.resolve import Resolver
@@ -50,7 +50,7 @@ def _written_in(unit: _Declared) -> list[str]:
 
 
 @cache
-def exported() -> dict[str, str]:
+def library_components() -> dict[str, str]:
     """The components of the standard library, with the module that each is in."""
     found = {}
     for path in sorted(LIBRARY.glob("*.sd")):
@@ -78,7 +78,7 @@ def _hides_function(symbol: Symbol) -> bool:
     return isinstance(symbol, (FunctionSymbol, TableSymbol)) and symbol.name in dim.FUNCTIONS
 
 
-def _stepped(table: Table, held: tuple[str, ...]) -> dict[str, Table]:
+def _grid_tables(table: Table, held: tuple[str, ...]) -> dict[str, Table]:
     """The tables that stand for one: of two arguments that hold, each is taken down to its point of the grid, where
     the bilinear table has the value itself.
     """
@@ -102,29 +102,40 @@ class FileScope:
 
     def _declare(self, file: syntax.File, scope: Scope) -> None:
         """Units first, then every other name of a file."""
+        # statements that could not be read: the names in them are declared, if wrongly, so that their uses are no
+        # errors of their own
         for item in file.items:
             if isinstance(item, syntax.Broken):
                 scope.broken |= item.names
                 if "std" in item.names:  # an import that could not be read: what hangs on it is not reported again
-                    scope.broken |= {name for name, module in exported().items() if module in item.names}
+                    scope.broken |= {name for name, module in library_components().items() if module in item.names}
+        # `unit kN = 1000 N`: coefficients and parameters of the file may be written in it
         units = [item for item in file.items if isinstance(item, (syntax.UnitAlias, syntax.UnitBase))]
-        for unit in self._ordered(units, scope, file.source):  # units first: everything else is written in them
+        for unit in self._dependency_order(
+            units, scope, file.source
+        ):  # units first: everything else is written in them
             self._unit(unit, scope, file.source)
+        # domains, components, constants, functions, tables and imports, in the order of the text
         for item in file.items:
             for symbol in self._symbols(item, scope, file.source):
                 self._enter(symbol, scope)
         Bundles(file, scope, self.report).declare(self._enter)
 
     def _enter(self, symbol: Symbol, scope: Scope) -> None:
+        """Enter a symbol in a file's scope; E106 where another one has its name, N102 where it hides one of the
+        language.
+        """
         before = scope.symbols.get(symbol.name)
         if before is symbol:  # imported twice
             return
+        # two declarations of one name, or one beside an import
         if before is not None:
             place, first = (self._imported.get(id(s), s.place) for s in (symbol, before))
             related = (Related("first declared here", first),)
             self.report.error("E106", f"'{symbol.name}' is declared twice", place, related=related)
             return
         scope.symbols[symbol.name] = symbol
+        # a name of the prelude may be declared anew, which N102 notes
         if scope.outer is not None and (symbol.name in scope.outer.symbols or _hides_function(symbol)):
             self._hides(symbol.name, self._imported.get(id(symbol), symbol.place))
 
@@ -132,7 +143,7 @@ class FileScope:
         """N102: from here on the name means what this file says."""
         self.report.note("N102", f"'{name}' of this file hides the '{name}' that the language has", place)
 
-    def _ordered(self, units: Sequence[_Declared], scope: Scope, source: SourceText) -> Iterator[_Declared]:
+    def _dependency_order(self, units: Sequence[_Declared], scope: Scope, source: SourceText) -> Iterator[_Declared]:
         """The units of a text, each behind those that it is written in; E105 of one that needs itself."""
         first: dict[str, _Declared] = {}
         for unit in units:
@@ -152,18 +163,22 @@ class FileScope:
         if name in scope.units:
             self.report.error("E106", f"unit '{name}' is declared twice", Place(source, item.name.span))
             return
-        if known(name) is not None:
+        # `unit N = ...` hides the SI's N in this file
+        if find_unit(name) is not None:
             self._hides(name, Place(source, item.name.span))
+        # `unit EUR base`: a dimension that nothing else has
         if isinstance(item, syntax.UnitBase):
             scope.units[name] = Unit(((name, 1),), Fraction(1), name)
+        # `unit kp = 9.81 N`: a positive constant multiple of known units
         else:
             resolver = Resolver(self.report)
             try:
-                with resolver.within(scope, source):
+                with resolver.entering_scope(scope, source):
                     value = resolver.scalar(item.value)
             except Failed:
                 scope.broken.add(name)
                 return
+            # `unit u = 0 m`, `unit u = -1 m` or one that reads a parameter measures nothing
             if value.node.op != "const" or not 0.0 < value.node.data < float("inf"):
                 message = f"unit '{name}' is not a positive constant"
                 self.report.error("E201", message, Place(source, item.value.span))
@@ -174,10 +189,13 @@ class FileScope:
     def _symbols(self, item: syntax.TopLevel, scope: Scope, source: SourceText) -> Iterator[Symbol]:
         """The names that a top-level item declares."""
         match item:
+            # effort, flow and what a node has in common
             case syntax.Domain():
                 yield from self._domain(item, scope, source)
+            # a model may be used as a component of another one
             case syntax.Component() | syntax.Model():
                 yield ComponentSymbol(item.name.name, item.body, scope, source, Place(source, item.name.span))
+            # resolved where it is read first, in the scope of its own file
             case syntax.Const():
                 span = item.name.span
                 place = Place(source, span)
@@ -187,6 +205,7 @@ class FileScope:
                 yield FunctionSymbol(item, source, scope, Place(source, item.name.span))
             case syntax.Table():
                 yield from self._table(item, scope, source)
+            # the symbols of another file, entered as if they were declared here
             case syntax.Import():
                 yield from self._import(item, source)
 
@@ -194,20 +213,24 @@ class FileScope:
         """Names of another file or of the library; what is not there is reported once."""
         module = self._module(item, source)
         if module is None:
+            # each name is a unit, another symbol, or not there
             for word in item.names:  # reported; what hangs on them is not reported again
                 self.scope.broken.add(word.name)
             return
         for word in item.names:
             symbol = module.symbols.get(word.name)
             unit = module.units.get(word.name)
+            # `from units import kp`
             if unit is not None:
                 self.scope.units[word.name] = unit
+            # the place of the import is kept: two imports of one name are reported there
             elif symbol is not None:
                 self._imported[id(symbol)] = Place(source, word.span)
-                self._continued(symbol, word, source)
+                self._warn_of_extrapolation(symbol, word, source)
                 yield symbol
+            # `from std.electrical import mass`: the module that has it, or the nearest name of this one
             else:
-                other = exported().get(word.name)
+                other = library_components().get(word.name)
                 near = None if other else nearest(word.name, module.symbols)
                 text = ".".join(item.module.names)
                 help_ = f"nearest exported name: '{near}'" if near else f"it exports {', '.join(module.symbols)}"
@@ -215,7 +238,7 @@ class FileScope:
                 self.report.error("E103", f"'{word.name}' is not in {text}", Place(source, word.span), help=help_)
                 self.scope.broken |= {word.name} | ({near} - self.scope.symbols.keys() if near else set())
 
-    def _continued(self, symbol: Symbol, word: syntax.Word, source: SourceText) -> None:
+    def _warn_of_extrapolation(self, symbol: Symbol, word: syntax.Word, source: SourceText) -> None:
         """W302: a table that is read here, and that the text which holds its data continues beyond them."""
         table = self.tables.get(symbol.key) if isinstance(symbol, TableSymbol) else None
         if table is not None and table.outside == "extend" and source is self.file.source:
@@ -230,6 +253,7 @@ class FileScope:
         inside = names[0] == "std"
         folder = LIBRARY if inside else Path(source.name).parent
         path = folder.joinpath(*names[inside:]).with_suffix(".sd")
+        # read before; None: it is being read now, so that the two import each other
         if path in self._modules:
             found = self._modules[path]
             if found is None:
@@ -237,6 +261,7 @@ class FileScope:
                 other = f"modules '{here}' and '{names[-1]}' import each other"
                 self.report.error("E801", f"module '{here}' imports itself" if here == names[-1] else other, place)
             return found
+        # `from std.electric import resistor`, or `from electrical import ...` without the `std.`
         if not path.is_file():
             modules = sorted(p.stem for p in folder.glob("*.sd") if p.stem != "prelude")
             near = nearest(names[-1], modules)
@@ -246,6 +271,7 @@ class FileScope:
             help_ = f"nearest module: '{head}{near}'" if near else f"there are {listed or 'none'}"
             self.report.error("E103", f"there is no module '{'.'.join(names)}'", place, help=help_)
             return None
+        # marks the module as being read until its names are there
         self._modules[path] = None
         file, problems = _of_library(path) if inside else parse(SourceText.read(path))
         self.report.extend(problems)
@@ -262,6 +288,7 @@ class FileScope:
         """A domain from its roles: units of effort, flow, momentum, displacement, and what is common at a node."""
         units: dict[str, Unit] = {}
         common, pseudo, before = "effort", None, len(self.report)
+        # roles with their units, what is common at a node, and whether effort times flow is no power
         for part in item.body:
             match part:
                 case syntax.DomainRole():
@@ -275,11 +302,13 @@ class FileScope:
         place = Place(source, item.name.span)
         missing = [k for k in ("effort", "flow", "displacement") if k not in units]
         unread = len(self.report) > before or any(isinstance(part, syntax.Broken) for part in item.body)
+        # effort, flow and displacement have no default; a role that was misread is reported already
         if missing and not unread:
             self.report.error("E210", f"domain {item.name.name}: its {missing[0]} is not given", place)
         if missing or unread:
             scope.broken.add(item.name.name)
             return
+        # without a momentum there are no kinetic stores (thermal); its unit is that of effort times time
         kinetic = "momentum" in units
         units.setdefault("momentum", si(multiply(units["effort"].dimension, dim.TIME)))
         self._check_domain(item.name.name, units, pseudo, place)
@@ -322,7 +351,7 @@ class FileScope:
         yield TableSymbol(item.name.name, key, arguments, result.dimension, place, held)
         table = read_table(item, units, result, source, self.report)
         if table is not None:
-            self.tables |= _stepped(replace(table, name=key), held)
+            self.tables |= _grid_tables(replace(table, name=key), held)
 
     def _key(self, name: str, source: SourceText) -> str:
         """What a table is called among those of all files: by its own name in the model's, else with its module's."""

@@ -63,7 +63,7 @@ class Requirement:
 
 @dataclass(slots=True)
 class CastRequirement:
-    """The same of an instance that was cast, whose node is made where somebody reads it."""
+    """A requirement of an instance that was cast: its node is made where somebody reads it."""
 
     cast: Cast
     path: str
@@ -141,7 +141,7 @@ class ElaborationContext:
         self.report = report
         self.resolver = Resolver(report)
         self.parts = NetworkBuilder()
-        self.resolver.branches, self.resolver.given = self.parts.branches, self.given
+        self.resolver.branches, self.resolver.given = self.parts.branches, self.with_instance_parameters
         self.scope = Scope()
         self.current = Space("", self.scope, self.scope, self.resolver.source)
         self._postponed: list[tuple[Space, NotYetError, Callable[[], None]]] = []
@@ -162,7 +162,7 @@ class ElaborationContext:
             except NotYetError as early:
                 self.postpone(early, partial(self.each, [(statement, loops)], do))
             except Failed:  # what it would have declared is not reported again where it is used
-                for decl in declared(statement):
+                for decl in declarations_of(statement):
                     if decl.name not in self.scope.symbols:
                         self.scope.broken.add(decl.name)
             except budget.SpentError as spent:
@@ -178,7 +178,7 @@ class ElaborationContext:
         """Statements that were postponed."""
         return len(self._postponed)
 
-    def postponed(self) -> None:
+    def run_postponed(self) -> None:
         """Carry out what had to wait; E105 where one waits for itself."""
         waiting = 0
         while self._postponed and len(self._postponed) != waiting:
@@ -199,7 +199,7 @@ class ElaborationContext:
             if all(loop.index != several.loop for loop in self.resolver.loops):
                 raise self.resolver.spread(several, span) from None
             for part in several.parts:
-                with self.resolver.narrowed(several, part):
+                with self.resolver.narrowing(several, part):
                     self.in_parts(do, span)
 
     @contextmanager
@@ -216,7 +216,7 @@ class ElaborationContext:
         """A span of the present text."""
         return Place(self.resolver.source, span)
 
-    def said(self, statement: Energy | Work | Constraint) -> None:
+    def add_statement(self, statement: Energy | Work | Constraint) -> None:
         """Takes in what the present model or instance says."""
         kinds: dict[type, list[Any]] = {Energy: self.parts.energies, Work: self.parts.works}
         kinds.get(type(statement), self.parts.constraints).append(statement)
@@ -265,12 +265,12 @@ class ElaborationContext:
             return True
         if len(shape) != 1:
             return False
-        first, last = (self.given(node) for node in shape[0])
+        first, last = (self.with_instance_parameters(node) for node in shape[0])
         if not (ex.is_const(first) and ex.is_const(last)):
             return False
         return int(last.data) - int(first.data) + 1 == len(value.items)
 
-    def given(self, node: Node) -> Node:
+    def with_instance_parameters(self, node: Node) -> Node:
         """A bound with the parameters that the instance gives."""
         parameters = self.parts.parameters
         while True:
@@ -283,7 +283,7 @@ class ElaborationContext:
                 return node
             node = ex.substitute(node, values)
 
-    def looped(self, index: syntax.Index) -> Node | None:
+    def loop_index(self, index: syntax.Index) -> Node | None:
         """An index that varies with the loops around; None of `1..n` and `3`, which declare all elements at once."""
         node = None if isinstance(index, syntax.Range) else self.resolver.whole_number(index, "an index")
         return node if node is not None and self._loops_of(node) else None
@@ -303,7 +303,7 @@ def flatten(body: Sequence[syntax.Statement], loops: tuple[syntax.For, ...] = ()
             yield statement, loops
 
 
-def declared(statement: syntax.Statement) -> tuple[syntax.Decl, ...]:
+def declarations_of(statement: syntax.Statement) -> tuple[syntax.Decl, ...]:
     """The names that a statement declares."""
     decls: tuple[syntax.Decl, ...] = getattr(statement, "decls", ())
     own = getattr(statement, "decl", None)

@@ -31,12 +31,14 @@ def read_table(
     name = item.name.name
     place = Place(source, item.name.span)
     try:
+        # `[(0, 0), (1, 2)]` in the text, or `file "data.csv"` beside it
         if item.rows is not None:
             rows = _written(item, [*units, result], source, report)
         else:
             rows = _from_file(item, [*units, result], source, report)
     except Failed:
         return None
+    # one argument: rows in increasing order, each argument once
     back = next((k for k, (a, b) in enumerate(pairwise(rows), 1) if a[0] >= b[0]), None) if len(units) == 1 else None
     if back is not None:
         where = place if item.rows is None else Place(source, item.rows[back].span)
@@ -44,6 +46,7 @@ def read_table(
         message = f"table {name}: {number} does not lie behind the one before it: arguments increase from row to row"
         report.error("E206", message, where, help="the rows in the order of their arguments, each once")
         return None
+    # several arguments: the rows make a full grid, in any order
     problem = _grid_problem(rows, len(units), item.interpolation) if len(units) > 1 else None
     if problem or len(rows) < 2:
         report.error("E206", f"table {name}: {problem or 'two rows at least'}", place, help="(0, 0), (1, 2)")
@@ -63,6 +66,7 @@ def _grid_problem(rows: list[Row], arguments: int, interpolation: str) -> str | 
 
 
 def _written(item: syntax.Table, units: list[Unit], source: SourceText, report: Report) -> list[Row]:
+    """Rows of a table in the text, in base units; Failed after reporting E206 of a row of another length."""
     rows = []
     for row in item.rows or ():
         if len(row.numbers) != len(units):
@@ -71,21 +75,26 @@ def _written(item: syntax.Table, units: list[Unit], source: SourceText, report: 
             report.error("E206", message, Place(source, row.span), help=f"each row is ({heads})")
             raise Failed
         texts = [n.text.replace(" ", "") for n in row.numbers]
-        rows.append(tuple(_scaled(t, u) for t, u in zip(texts, units, strict=True)))
+        rows.append(tuple(_to_base_unit(t, u) for t, u in zip(texts, units, strict=True)))
     return rows
 
 
 def _from_file(item: syntax.Table, units: list[Unit], source: SourceText, report: Report) -> list[Row]:
+    """Rows of a table's file, in base units; Failed after reporting E206. One line of names above the numbers is passed
+    over.
+    """
     place = Place(source, item.span)
     assert item.file is not None
     folder = real(source.name).parent
     path = real(folder / item.file)
+    # `../secret.csv`, or a link that leads out
     if not path.is_relative_to(folder):
         help_ = "put the file beside the model"
         report.error("E206", f"table {item.name.name}: '{item.file}' is outside the model's folder", place, help=help_)
         raise Failed
     try:
         found = path.stat()
+        # a folder, a pipe that never ends
         if not stat.S_ISREG(found.st_mode):
             raise OSError(22, "it is no regular file")
         if found.st_size > MAX_BYTES:
@@ -97,6 +106,7 @@ def _from_file(item: syntax.Table, units: list[Unit], source: SourceText, report
         report.error("E206", f"table {item.name.name}: '{item.file}' cannot be read: {reason}", place, help=help_)
         raise Failed from None
     rows: list[Row] = []
+    # rows of numbers; empty lines and remarks are passed over
     for number, line in enumerate(lines, 1):
         cells = [c.strip() for c in line.split(",")]
         if not line.strip() or line.lstrip().startswith("#"):
@@ -104,7 +114,7 @@ def _from_file(item: syntax.Table, units: list[Unit], source: SourceText, report
         try:
             if len(cells) != len(units):
                 raise ValueError
-            rows.append(tuple(_scaled(c, u) for c, u in zip(cells, units, strict=True)))
+            rows.append(tuple(_to_base_unit(c, u) for c, u in zip(cells, units, strict=True)))
         except (ValueError, ZeroDivisionError, OverflowError):
             if rows or number > 1 or any(_NUMBER.fullmatch(c) for c in cells):  # else the names of the columns
                 message = f"table {item.name.name}: line {number} of '{item.file}' is not {len(units)} numbers"
@@ -115,7 +125,7 @@ def _from_file(item: syntax.Table, units: list[Unit], source: SourceText, report
     return rows
 
 
-def _scaled(text: str, unit: Unit) -> float:
+def _to_base_unit(text: str, unit: Unit) -> float:
     if _NUMBER.fullmatch(text) is None:  # Python takes 1_0 and figures of other scripts too
         raise ValueError(text)
     value = float(text)

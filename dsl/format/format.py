@@ -188,6 +188,7 @@ def _body_of(node: Any) -> Sequence[Any] | None:
 
 def _head_end(node: Any) -> int:
     """An offset between the parts of a statement's head and its `{`."""
+    # the last part of the head: `for i in 1..n {`, `when x > 0 {`, `every 10 ms {`, `scene s of m {`
     match node:
         case s.For():
             return node.upper.span.end
@@ -197,6 +198,7 @@ def _head_end(node: Any) -> int:
             return node.period.span.end
         case s.Scene():
             return node.model.span.end
+        # component, model, level, ...: their names
         case _:
             end: int = node.name.span.end
             return end

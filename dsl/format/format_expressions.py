@@ -49,15 +49,19 @@ def pieces(expr: s.Expr | s.Range) -> list[str]:
     after_unit = False
     while stack:
         part = stack.pop()
+        # a sign or a word: goes out as it is
         if isinstance(part, str):
+            # `300 K / T` divides by T; `300 K/T` would be a unit
             if after_unit and part == "/" and stack and _begins_like_a_name(stack[-1]):
                 part = " / "
+            # `(2 m) ^n` likewise
             elif after_unit and part == "^":
                 part = " ^"
             after_unit = False
             out.append(part)
             continue
         node, level = part
+        # a sum as a factor needs parentheses
         if _LEVELS.get(type(node), _ATOM) < level:
             stack.extend((")", (node, _CONDITIONAL), "("))
             continue
@@ -79,7 +83,7 @@ def _begins_like_a_name(part: Part) -> bool:
     return part[:1].isalpha() or part[:1] == "_"
 
 
-def separated(items: Iterable[Part]) -> list[Part]:
+def comma_list(items: Iterable[Part]) -> list[Part]:
     """Parts with ', ' between them."""
     out: list[Part] = []
     for item in items:
@@ -112,7 +116,7 @@ def _member(e: s.Member) -> list[Part]:
 
 
 def _item(e: s.Item) -> list[Part]:
-    return [(e.base, _ATOM), "[", *separated((index, _SUM) for index in e.indices), "]"]
+    return [(e.base, _ATOM), "[", *comma_list((index, _SUM) for index in e.indices), "]"]
 
 
 def _range(e: s.Range) -> list[Part]:
@@ -128,11 +132,11 @@ def _arg(e: s.Arg) -> list[Part]:
 
 
 def _call(e: s.Call) -> list[Part]:
-    return [e.name + "(", *separated((arg, _CONDITIONAL) for arg in e.args), ")"]
+    return [e.name + "(", *comma_list((arg, _CONDITIONAL) for arg in e.args), ")"]
 
 
 def _method(e: s.Method) -> list[Part]:
-    return [(e.base, _ATOM), f".{e.name}(", *separated((arg, _CONDITIONAL) for arg in e.args), ")"]
+    return [(e.base, _ATOM), f".{e.name}(", *comma_list((arg, _CONDITIONAL) for arg in e.args), ")"]
 
 
 def _reduction(e: s.Reduction) -> list[Part]:
@@ -171,14 +175,14 @@ def _compare(e: s.Compare) -> list[Part]:
 
 
 def _or(e: s.Or) -> list[Part]:
-    return _joined(e.operands, " or ", _AND)
+    return _infix(e.operands, " or ", _AND)
 
 
 def _and(e: s.And) -> list[Part]:
-    return _joined(e.operands, " and ", _NOT)
+    return _infix(e.operands, " and ", _NOT)
 
 
-def _joined(operands: Iterable[s.Expr], word: str, level: int) -> list[Part]:
+def _infix(operands: Iterable[s.Expr], word: str, level: int) -> list[Part]:
     """Operands with a word between them."""
     out: list[Part] = []
     for operand in operands:
@@ -202,7 +206,7 @@ def _conditional(e: s.Conditional) -> list[Part]:
 
 
 def _array(e: s.Array) -> list[Part]:
-    return ["[", *separated((item, _CONDITIONAL) for item in e.items), "]"]
+    return ["[", *comma_list((item, _CONDITIONAL) for item in e.items), "]"]
 
 
 def _group(e: s.Group) -> list[Part]:

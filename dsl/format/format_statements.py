@@ -24,7 +24,7 @@ def row_text(row: s.Row) -> str:
     return "(" + ", ".join(number.text for number in row.numbers) + ")"
 
 
-def _listed(parts: Iterable[Pieces]) -> Pieces:
+def _comma_list(parts: Iterable[Pieces]) -> Pieces:
     """Parts with commas between them."""
     out: Pieces = []
     for part in parts:
@@ -38,12 +38,12 @@ def _decl(decl: s.Decl) -> Pieces:
     """A declared name with its indices."""
     if not decl.indices:
         return [decl.name]
-    return [decl.name + "[", *_listed(pieces(index) for index in decl.indices), "]"]
+    return [decl.name + "[", *_comma_list(pieces(index) for index in decl.indices), "]"]
 
 
 def _decls(decls: Sequence[s.Decl]) -> Pieces:
     """Declared names."""
-    return _listed(_decl(item) for item in decls)
+    return _comma_list(_decl(item) for item in decls)
 
 
 def _after(text: str, expr: s.Expr | None) -> Pieces:
@@ -67,7 +67,7 @@ def _args(args: Sequence[s.Arg] | None) -> Pieces:
     """Arguments in parentheses; none at all where None."""
     if args is None:
         return []
-    return ["(", *_listed(_arg(item) for item in args), ")"]
+    return ["(", *_comma_list(_arg(item) for item in args), ")"]
 
 
 def _arg(arg: s.Arg) -> Pieces:
@@ -75,14 +75,14 @@ def _arg(arg: s.Arg) -> Pieces:
     return [*(() if arg.name is None else (f"{arg.name} = ",)), *pieces(arg.value)]
 
 
-def _named(name: s.Word | None) -> str:
+def _optional_name(name: s.Word | None) -> str:
     """An optional name behind a space."""
     return "" if name is None else " " + name.name
 
 
 def _parameters(params: Sequence[s.Parameter]) -> Pieces:
     """The head of a function or table."""
-    return ["(", *_listed(_parameter(item) for item in params), ")"]
+    return ["(", *_comma_list(_parameter(item) for item in params), ")"]
 
 
 def _parameter(item: s.Parameter) -> Pieces:
@@ -92,7 +92,7 @@ def _parameter(item: s.Parameter) -> Pieces:
 
 
 def _import(n: s.Import) -> Pieces:
-    return [f"from {'.'.join(n.module.names)} import ", *_listed([word.name] for word in n.names)]
+    return [f"from {'.'.join(n.module.names)} import ", *_comma_list([word.name] for word in n.names)]
 
 
 def _role(n: s.DomainRole) -> Pieces:
@@ -100,7 +100,7 @@ def _role(n: s.DomainRole) -> Pieces:
 
 
 def _member(n: s.BundleMember) -> Pieces:
-    return [*_listed([word.name] for word in n.names), ": ", n.domain.name]
+    return [*_comma_list([word.name] for word in n.names), ": ", n.domain.name]
 
 
 def _function(n: s.Function) -> Pieces:
@@ -149,11 +149,12 @@ def _expect(n: s.Expect) -> Pieces:
 
 def _instance(n: s.Instance) -> Pieces:
     head = [*_decl(n.decl), ": ", ".".join(n.component.names), *_args(n.args)]
-    connections = _listed(_connection(item) for item in n.connections)
+    connections = _comma_list(_connection(item) for item in n.connections)
     return [*head, *([" ", *connections] if connections else [])]
 
 
 def _connection(n: s.Connection) -> Pieces:
+    """Text of a connection in pieces, as it is written behind the parentheses of an element."""
     match n:
         case s.Across(plus, minus):
             return [*pieces(plus), " -> ", *pieces(minus)]
@@ -171,7 +172,7 @@ def _trace(n: s.Trace) -> Pieces:
     items = (
         [*pieces(i.expr), *([] if i.unit is None else [" in ", format_unit(i.unit)]), *_alias(i.alias)] for i in n.items
     )
-    return ["trace ", *_listed(items), *_after(" every ", n.every)]
+    return ["trace ", *_comma_list(items), *_after(" every ", n.every)]
 
 
 def _alias(alias: s.Word | None) -> Pieces:
@@ -179,7 +180,7 @@ def _alias(alias: s.Word | None) -> Pieces:
 
 
 def _accuracy(n: s.Accuracy) -> Pieces:
-    on = [" on ", *_listed(pieces(item) for item in n.on)] if n.on else []
+    on = [" on ", *_comma_list(pieces(item) for item in n.on)] if n.on else []
     return ["accuracy ", *pieces(n.value), *on, *([" relative to range"] if n.to_range else [])]
 
 
@@ -219,8 +220,8 @@ _PIECES: dict[type[Any], Callable[[Any], Pieces]] = {
     s.Dynamic: lambda n: ["dynamic ", *pieces(n.target), *_after(" = ", n.value)],
     s.Let: lambda n: ["let ", *_decl(n.decl), *_after(" = ", n.value)],
     s.Law: lambda n: ["law ", *pieces(n.left), *_after(" = ", n.right)],
-    s.Energy: lambda n: [f"energy {n.function}{_named(n.name)}", *_after(" = ", n.value)],
-    s.Content: lambda n: [f"content {n.function}{_named(n.name)}", *_after(" = ", n.value)],
+    s.Energy: lambda n: [f"energy {n.function}{_optional_name(n.name)}", *_after(" = ", n.value)],
+    s.Content: lambda n: [f"content {n.function}{_optional_name(n.name)}", *_after(" = ", n.value)],
     s.Work: lambda n: ["work ", *pieces(n.effort), *_after(" on ", n.on)],
     s.Constraint: _constraint,
     s.Init: lambda n: ["init ", *pieces(n.target), *_initial(n.initial)],

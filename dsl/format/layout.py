@@ -19,6 +19,7 @@ def fill(pieces: Sequence[str], indent: int) -> list[str]:
     A break goes after the last comma, spaced operator or word that fits, and only where there is
     none after a `=`, `*`, `/` or an opening bracket.
     """
+    # most statements fit
     if sum(map(len, pieces)) + indent <= WIDTH:
         return [" " * indent + "".join(pieces).rstrip()]
     lines: list[str] = []
@@ -27,6 +28,7 @@ def fill(pieces: Sequence[str], indent: int) -> list[str]:
     good: int | None = None
     poor: int | None = None
     depth = 0
+    # greedy: at the last good place before the line is full, else at the last poor one
     while position < len(pieces):
         piece = pieces[position]
         width += len(piece)
@@ -38,7 +40,7 @@ def fill(pieces: Sequence[str], indent: int) -> list[str]:
             # breaks between the one taken and here are open again
             depth_there = _depth(pieces[at:position], depth)
             good, poor = _breaks(pieces, at, position, depth_there)
-        depth += _opened(piece)
+        depth += _open_brackets(piece)
         rank = _rank(piece, depth)
         position += 1
         if rank == 2:
@@ -54,7 +56,7 @@ def _line(pieces: Sequence[str], indent: int, continued: bool) -> str:
     return " " * (indent + CONTINUATION * continued) + "".join(pieces).rstrip()
 
 
-def _opened(piece: str) -> int:
+def _open_brackets(piece: str) -> int:
     """How many brackets a piece leaves open; brackets in texts do not count."""
     if '"' in piece:
         return 0
@@ -63,7 +65,7 @@ def _opened(piece: str) -> int:
 
 def _depth(pieces: Sequence[str], depth: int) -> int:
     """Depth before some pieces that end at a depth."""
-    return depth - sum(map(_opened, pieces))
+    return depth - sum(map(_open_brackets, pieces))
 
 
 def _breaks(pieces: Sequence[str], start: int, end: int, depth: int) -> tuple[int | None, int | None]:
@@ -71,7 +73,7 @@ def _breaks(pieces: Sequence[str], start: int, end: int, depth: int) -> tuple[in
     good: int | None = None
     poor: int | None = None
     for position in range(start, end):
-        depth += _opened(pieces[position])
+        depth += _open_brackets(pieces[position])
         rank = _rank(pieces[position], depth)
         if rank == 2:
             good = position + 1

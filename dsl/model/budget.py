@@ -68,7 +68,7 @@ class SpentError(Exception):
 
     def diagnostic(self, place: Place) -> Diagnostic:
         """E119, at the statement or at `place`."""
-        message = f"{self.what}: more than the {shown(granted())} that one model may take"
+        message = f"{self.what}: more than the {format_bytes(memory_limit())} that one model may take"
         return Diagnostic("E119", message, self.place or place, help="fewer of them, or a loop over an array")
 
 
@@ -94,7 +94,7 @@ class TooDeepError(SpentError):
         return Diagnostic("E119", message, self.place or place, help=help_)
 
 
-def granted() -> int:
+def memory_limit() -> int:
     """Bytes that one text may ask for on this machine."""
     return min(there() // 2, GRANTED)
 
@@ -116,7 +116,7 @@ def there() -> int:
     return most
 
 
-def shown(amount: float) -> str:
+def format_bytes(amount: float) -> str:
     """An amount of memory for a reader."""
     for unit, size in (("TB", 1e12), ("GB", 1e9), ("MB", 1e6)):
         if amount >= size:
@@ -132,7 +132,7 @@ def drawn(text: str) -> Iterator[None]:
     """
     before = _budget.left, _budget.pieces
     if before[0] == math.inf:
-        _budget.left, _budget.pieces = granted(), UNFOLDED + FOLLOWING * len(text)
+        _budget.left, _budget.pieces = memory_limit(), UNFOLDED + FOLLOWING * len(text)
     try:
         yield
     except RecursionError:  # expressions in definitions: together deeper than either may be
@@ -141,7 +141,7 @@ def drawn(text: str) -> Iterator[None]:
         _budget.left, _budget.pieces = before
 
 
-def within(depth: int, what: str) -> None:
+def check_depth(depth: int, what: str) -> None:
     """Count a level before it unfolds; TooDeepError where it is too deep."""
     if depth > DEEPEST:
         raise TooDeepError(what)

@@ -97,7 +97,7 @@ def _times(factors: Sequence[tuple[float, Node]]) -> Callable[[Node], Node]:
     return lambda node: product(1.0, [*factors, (1.0, node)])
 
 
-def _lowered(others: Sequence[tuple[float, Node]], exponent: float, base: Node, dot: Node) -> Node:
+def _power_differential(others: Sequence[tuple[float, Node]], exponent: float, base: Node, dot: Node) -> Node:
     """base^(exponent - 1) dot, and the other factors.
 
     The differential of 1/(c + w exp(v)) is exp(v)/(c + w exp(v))^2, inf/inf where the value itself is zero: in its
@@ -126,15 +126,18 @@ def _along(dot: Node, scaled: Callable[[Node], Node]) -> Node:
     """
     zero = const(0.0)
     branches, waiting = {dot}, [dot]
+    # all branches of nested conditions
     while waiting:
         node = waiting.pop()
         new = [a for a in node.args[1:] if a not in branches] if node.op == "cond" else []
         branches.update(new)
         waiting += new
+    # the usual case: no condition makes it zero
     if zero not in branches:
         return scaled(dot)
     done: dict[Node, Node] = {zero: zero}
     waiting = [dot]
+    # inside out, each condition once: zero where it was, scaled elsewhere
     while waiting:
         node = waiting[-1]
         inner = node.args[1:] if node.op == "cond" else ()
@@ -147,14 +150,14 @@ def _along(dot: Node, scaled: Callable[[Node], Node]) -> Node:
     return done[dot]
 
 
-def _joined(terms: Sequence[tuple[float, Node]]) -> Node:
+def _sum_differentials(terms: Sequence[tuple[float, Node]]) -> Node:
     """A sum of differentials; of some that one condition makes zero, within it: r - r^2 is flat where max(x, 1) = r
     is, under a root too.
     """
     first = terms[0][1] if len(terms) > 1 else const(0.0)
     if first.op != "cond" or any(d.op != "cond" or d.args[0] is not first.args[0] for _, d in terms):
         return linear(0.0, terms)
-    sides = (_joined([(w, d.args[k]) for w, d in terms]) for k in (1, 2))
+    sides = (_sum_differentials([(w, d.args[k]) for w, d in terms]) for k in (1, 2))
     return conditional(first.args[0], *sides)
 
 
@@ -162,19 +165,22 @@ def _chain(node: Node, dots: Sequence[Node]) -> Node:
     """The differential of a node from those of its arguments (some are zero)."""
     zero = const(0.0)
     match node.op:
+        # d(c u + k v) = c du + k dv
         case "sum":
             moving = [(w, d) for w, d in zip(node.data[1], dots, strict=True) if d is not zero]
             if len(moving) == 1:
                 return _along(moving[0][1], lambda d: linear(0.0, ((moving[0][0], d),)))
-            return _joined(moving)
+            return _sum_differentials(moving)
+        # the product rule, a term for each factor that moves
         case "mul":
             parts: list[tuple[float, Node]] = []
             for k, dot in enumerate(dots):
                 if dot is not zero:
                     others = [(e, a) for j, (e, a) in enumerate(zip(node.data, node.args, strict=True)) if j != k]
-                    lower = partial(_lowered, others, node.data[k], node.args[k])
+                    lower = partial(_power_differential, others, node.data[k], node.args[k])
                     parts.append((node.data[k], _along(dot, lower)))
-            return _joined(parts)
+            return _sum_differentials(parts)
+        # d(b^e) = e b^(e-1) db + b^e ln(b) de
         case "pow":
             base, exponent = node.args
             slope = mul(exponent, power(base, linear(-1.0, ((1.0, exponent),))))
@@ -182,24 +188,29 @@ def _chain(node: Node, dots: Sequence[Node]) -> Node:
                 _along(dots[0], lambda d: mul(slope, d)) if dots[0] is not zero else zero,
                 mul(node, call("ln", base), dots[1]) if dots[1] is not zero else zero,
             )
+        # of the argument that is taken
         case "call" if node.data in ("min", "max"):
             return conditional(compare("<=" if node.data == "min" else ">=", *node.args), *dots)
+        # the chain rule, with the partial derivatives of the function
         case "call":
             moving = [(p, d) for p, d in zip(_call_partials(node), dots, strict=True) if d is not zero]
             return add(*(_along(d, _times([(1.0, p)])) for p, d in moving))
+        # the condition itself has no slope
         case "cond":
             return conditional(node.args[0], dots[1], dots[2])
+        # a table's derivative is a table of higher order, in one argument or several
         case "table":
             if len(node.args) > 1:
                 orders = node.data[1] or (0,) * len(node.args)
                 return add(
                     *(
-                        mul(table(node.data[0], *node.args, order=_raised(orders, k)), d)
+                        mul(table(node.data[0], *node.args, order=_increment_order(orders, k)), d)
                         for k, d in enumerate(dots)
                         if d is not zero
                     )
                 )
             return mul(table(node.data[0], *node.args, order=node.data[1] + 1), dots[0])
+        # a sum of derivatives; of products and extrema it is not written down
         case "reduce":
             operator, name = node.data
             if operator == "sum":
@@ -208,7 +219,7 @@ def _chain(node: Node, dots: Sequence[Node]) -> Node:
     raise AssertionError(node.op)
 
 
-def _raised(orders: tuple[int, ...], k: int) -> tuple[int, ...]:
+def _increment_order(orders: tuple[int, ...], k: int) -> tuple[int, ...]:
     return tuple(o + (j == k) for j, o in enumerate(orders))
 
 
@@ -283,7 +294,7 @@ def moving(names: Iterable[str]) -> Iterator[None]:
         _MOVING.reset(token)
 
 
-def moved(root: Node) -> dict[Node, Node]:
+def parameter_rates(root: Node) -> dict[Node, Node]:
     """The parameters of root that move, with their rates."""
     names = _MOVING.get()
     if not names:
@@ -294,7 +305,7 @@ def moved(root: Node) -> dict[Node, Node]:
 
 def time_derivative(root: Node) -> Node:
     """Total derivative by t; ValueError names an unknown whose derivative is not among the variables."""
-    seeds = moved(root)
+    seeds = parameter_rates(root)
     for node in ordered_variables(root):
         dot = rate(node)
         if dot is None:

@@ -41,7 +41,7 @@ def _grown_old() -> None:
         gc.unfreeze()
 
 
-def kept() -> bool:
+def is_keeping() -> bool:
     """Whether the process ends with its command."""
     return _keeping
 

@@ -14,13 +14,16 @@ def in_order(names: Iterable[str], uses: Callable[[str], Iterable[str]]) -> tupl
     done: set[str] = set()
     for name in names:
         way: dict[str, Iterator[str]] = {} if name in done else {name: iter(uses(name))}
+        # depth first, without recursion: chains of definitions may be long
         while way:
             last = next(reversed(way))
             following = next(way[last], None)
+            # all that it uses is done
             if following is None:
                 del way[last]
                 done.add(last)
                 order.append(last)
+            # it is being done: a circle
             elif following in way:
                 around = list(way)
                 circles.append((*around[around.index(following) :], following))

@@ -66,11 +66,11 @@ def result(name: str, dimension: Dimension | None) -> Dimension | None:
     if name == "celsius":
         return (("K", 1),)
     if rule == _ROOT:
-        return None if dimension is None else halved(dimension)
+        return None if dimension is None else square_root(dimension)
     return dimension if rule == _SAME else NONE
 
 
-def halved(dimension: Dimension) -> Dimension:
+def square_root(dimension: Dimension) -> Dimension:
     """The dimension of a square root."""
     halves = ((k, Fraction(v) / 2) for k, v in dimension)
     return tuple((k, int(v) if v.denominator == 1 else v) for k, v in halves)

@@ -57,6 +57,7 @@ _COMPARE: Mapping[str, Callable[[float, float], bool]] = {
 
 
 def _value(node: Node, values: Mapping[Node, Any], lookup: Callable[[Node], float]) -> Any:
+    """Value of a node from those of its arguments; leaves by `lookup`. Sums are rounded once (fsum)."""
     args = [values[a] for a in node.args if a in values]
     match node.op:
         case "const":
@@ -82,27 +83,31 @@ def _value(node: Node, values: Mapping[Node, Any], lookup: Callable[[Node], floa
             return any(args)
         case "not":
             return not args[0]
+        # bounds that are no numbers make no sum
         case "reduce":
             finite = math.isfinite(args[0]) and math.isfinite(args[1])
             return _reduce(node, round(args[0]), round(args[1]), lookup) if finite else math.nan
+        # a variable, parameter, time, index or table
         case _:
             return lookup(node)
 
 
 def _reduce(node: Node, first: int, last: int, lookup: Callable[[Node], float]) -> float:
+    """A sum, product or extremum over a range first..last, of a body that is evaluated for each index."""
     operator, name = node.data
     me = index(name)
 
-    def at(i: int) -> float:
+    def term(i: int) -> float:
         return evaluate([node.args[2]], lambda n: float(i) if n is me else lookup(n))[0]
 
     budget.charge(budget.TERM * max(last - first, 0), f"the terms of a {operator} one by one")
-    items = [at(i) for i in range(first, last + 1)]
+    items = [term(i) for i in range(first, last + 1)]
     match operator:
         case "sum":
             return math.fsum(items)
         case "prod":
             return math.prod(items)
+        # of nothing: no bound at all
         case "min":
             return min(items, default=math.inf)
         case _:

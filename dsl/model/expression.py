@@ -136,11 +136,14 @@ def linear(constant: float, terms: Iterable[tuple[float, Node]]) -> Node:
     """Constant + sum of coefficient*node, canonical."""
     total = constant
     found: dict[Node, float] = {}
+    # alike terms are added, inner sums opened: 2 (x + 1) + x is one node whatever its order
     for coefficient, node in terms:
+        # a term that is no sum
         if node.op not in {"sum", "const"}:  # most terms
             found[node] = found.get(node, 0.0) + coefficient
             continue
         inner, parts = _terms(node)
+        # c*(a + b) stays: opened it would double with each differentiation
         if node.op == "sum" and coefficient not in (1.0, -1.0) and len(parts) > 1:
             found[node] = found.get(node, 0.0) + coefficient
             continue
@@ -150,8 +153,10 @@ def linear(constant: float, terms: Iterable[tuple[float, Node]]) -> Node:
     kept = [(c, n) for n, c in found.items() if c != 0.0]
     if not kept:
         return const(total)
+    # 1*x is x
     if total == 0.0 and len(kept) == 1 and kept[0][0] == 1.0:
         return kept[0][1]
+    # the key does not depend on the order in which terms were written
     ordered = tuple(sorted([(n.number, c) for c, n in kept]))
     data = (total + 0.0, tuple([c for c, _ in kept]))
     return _make("sum", data, tuple([n for _, n in kept]), key=(total + 0.0, ordered))
@@ -200,6 +205,7 @@ def product(constant: float, factors: Iterable[tuple[float, Node]]) -> Node:
     """Constant * prod(node^exponent), canonical."""
     total = constant
     found: dict[Node, float] = {}
+    # exponents of alike factors are added, inner products opened
     for exponent, node in factors:
         if node.op not in _TAKEN_APART:  # most factors
             found[node] = found.get(node, 0.0) + exponent
@@ -220,8 +226,10 @@ def product(constant: float, factors: Iterable[tuple[float, Node]]) -> Node:
     kept = [(e, n) for n, e in found.items() if e != 0.0]
     if any(not math.isfinite(e) for e, _ in kept):  # exponents that multiply to more than a number: powers of their own
         kept = [(e, n) if math.isfinite(e) else (1.0, _make("pow", None, (n, const(e)))) for e, n in kept]
+    # all exponents cancel: x/x is 1
     if not kept:
         return const(total)
+    # x^1 is x
     if len(kept) == 1 and kept[0][0] == 1.0:
         node = kept[0][1]
     else:
@@ -259,6 +267,7 @@ def sqrt(node: Node) -> Node:
 
 def call(name: str, *args: Node) -> Node:
     """A function of the language; clip, frac, smoothstep, log and sqrt become simpler nodes."""
+    # a power of 1/2, which rules of powers simplify
     if name == "sqrt":
         return sqrt(args[0])
     if name == "clip":
@@ -268,10 +277,12 @@ def call(name: str, *args: Node) -> Node:
     if name == "smoothstep":
         x = call("min", call("max", args[0], const(0.0)), const(1.0))
         return mul(x, x, linear(3.0, ((-2.0, x),)))
+    # of two arguments each, so that a derivative is a condition
     if name in ("min", "max") and len(args) != 2:
         return call(name, call(name, *args[:-1]), args[-1]) if len(args) > 2 else args[0]
     if name == "signal":
         return signal(args[0])
+    # constants are evaluated at once
     if all(a.op == "const" for a in args):
         return const(FUNCTIONS[name](*(a.data for a in args)))
     return _make("call", name, args)
@@ -317,8 +328,8 @@ def reduction(operator: str, name: str, first: Node, last: Node, body: Node) -> 
     return _make("reduce", (operator, name), (first, last, body))
 
 
-def reduced(operator: str, parts: Sequence[Node]) -> Node:
-    """The same written out: sum, prod, min or max of its parts."""
+def combine_terms(operator: str, parts: Sequence[Node]) -> Node:
+    """A reduction written out: sum, prod, min or max of its parts."""
     return add(*parts) if operator == "sum" else mul(*parts) if operator == "prod" else call(operator, *parts)
 
 
@@ -327,7 +338,7 @@ def reduced(operator: str, parts: Sequence[Node]) -> Node:
 
 def topological(roots: Iterable[Node]) -> list[Node]:
     """All nodes below the roots, arguments before users, in a deterministic order."""
-    return _ordered(roots, bodies=True)
+    return _post_order(roots, bodies=True)
 
 
 def nodes_of(root: Node) -> Sequence[Node]:
@@ -347,19 +358,23 @@ def reads(root: Node, parameters: Container[str]) -> bool:
 
 def topological_unbound(roots: Iterable[Node]) -> list[Node]:
     """Like `topological`, but does not enter the bodies of reductions (their loop variable is not bound there)."""
-    return _ordered(roots, bodies=False)
+    return _post_order(roots, bodies=False)
 
 
 @lru_cache(maxsize=128)
 def order_of(roots: tuple[Node, ...]) -> tuple[Node, ...]:
-    """The same, kept for a while: of what is evaluated again and again (samples of a law, bisections of an instant)."""
-    return tuple(_ordered(roots, bodies=False))
+    """Post-order of some roots, kept for a while: of what is evaluated again and again (samples of a law, bisections of
+    an instant).
+    """
+    return tuple(_post_order(roots, bodies=False))
 
 
-def _ordered(roots: Iterable[Node], *, bodies: bool) -> list[Node]:
+def _post_order(roots: Iterable[Node], *, bodies: bool) -> list[Node]:
+    """All nodes below some roots, each once, arguments first; bodies: those of reductions too."""
     seen: set[Node] = set()
     order: list[Node] = []
     for root in roots:
+        # a leaf
         if not root.args:
             if root not in seen:
                 seen.add(root)
@@ -370,6 +385,7 @@ def _ordered(roots: Iterable[Node], *, bodies: bool) -> list[Node]:
             order += [node for node in dict.fromkeys((*root.args, root)) if node not in seen]
             seen.update((*root.args, root))
             continue
+        # a node, then None as a mark that its arguments lie above, then these
         while stack:
             node = stack.pop()
             if node is None:  # all below what lies under it is done
@@ -386,7 +402,8 @@ def _ordered(roots: Iterable[Node], *, bodies: bool) -> list[Node]:
 
 
 def rebuild(node: Node, args: tuple[Node, ...]) -> Node:
-    """The same operation on other arguments, simplified again."""
+    """An operation on other arguments, simplified again."""
+    # nothing changed: the node itself, so that identity tells equality
     if args == node.args:
         return node
     match node.op:
@@ -400,6 +417,7 @@ def rebuild(node: Node, args: tuple[Node, ...]) -> Node:
             return call(node.data, *args)
         case "cond":
             return conditional(*args)
+        # leaves and operations without rules of their own
         case _:
             return _make(node.op, node.data, args)
 
@@ -427,5 +445,7 @@ def variables(root: Node) -> frozenset[Node]:
 
 
 def ordered_variables(root: Node) -> list[Node]:
-    """The same in the order they were made: for whoever makes nodes of them, so that a text is the same each time."""
+    """Variables below a root in the order they were made: for whoever makes nodes of them, so that a text is the same
+    each time.
+    """
     return sorted(variables(root), key=lambda n: n.number)

@@ -37,6 +37,7 @@ _PRIMES = {("q", 1): "'", ("f", 0): "'", ("f", 1): "''"}
 
 
 def _show(node: Node, args: list[str]) -> str:
+    """Text of a node from the texts of its arguments, in the syntax of the language."""
     data: Any = node.data
     match node.op:
         case "const":
@@ -45,6 +46,7 @@ def _show(node: Node, args: list[str]) -> str:
             return str(data) + (f"[{', '.join(args)}]" if args else "")
         case "time":
             return "t"
+        # x, x', x''; of nodes and elements R1.e; multipliers by their label
         case "var":
             family, kind, order = data
             base = str(family) + (f"[{', '.join(args)}]" if args else "")
@@ -73,6 +75,7 @@ def _show(node: Node, args: list[str]) -> str:
             return f"{node.data[0]}{_orders(node.data[1])}({', '.join(args)})"
         case "reduce":
             return f"{node.data[0]}({node.data[1]} in {args[0]}..{args[1]}: {args[2]})"
+        # a function
         case _:
             return f"{node.data}({', '.join(args)})"
 
@@ -82,6 +85,7 @@ def _orders(orders: int | tuple[int, ...]) -> str:
 
 
 def _show_sum(node: Node, args: list[str]) -> str:
+    """Text of a sum; a sign stands before each term but a first positive one."""
     constant, coefficients = node.data
     parts = []
     for c, a, n in zip(coefficients, args, node.args, strict=True):

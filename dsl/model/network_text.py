@@ -15,6 +15,7 @@ def show(network: Network) -> str:
 
 
 def _lines(n: Network) -> Iterator[str]:
+    """A line for each statement of the network, in the order in which it holds them."""
     scene = f" under scene {n.scene.name}" if n.scene else ""
     yield f"model {n.model}{scene}"
     for p in n.parameters:
@@ -55,7 +56,7 @@ def _lines(n: Network) -> Iterator[str]:
 
 def _branch(b: Branch) -> str:
     ends = f"on {b.on}" if b.on is not None else f"{_terminal(b, b.plus)} -> {_terminal(b, b.minus)}"
-    name = b.name + _at(b.at)
+    name = b.name + _index_text(b.at)
     law = "" if b.law is None else f": {name}.{b.side} = {b.law}"
     return f"{b.kind} {name} {ends}{law}"
 
@@ -63,15 +64,15 @@ def _branch(b: Branch) -> str:
 def _terminal(b: Branch, end: Terminal | None) -> str:
     if end is None or end.node is None:
         return f"ground of {b.domain.name}"
-    return end.node + _at(end.at)
+    return end.node + _index_text(end.at)
 
 
 def _coupling(c: Coupling) -> str:
-    first, second = c.first + _at(c.at), c.second + _at(c.at)
+    first, second = c.first + _index_text(c.at), c.second + _index_text(c.at)
     return f"{c.kind} {first}.{c.side} = ({c.ratio})*{second}.{c.read}"
 
 
-def _at(at: tuple[Node, ...]) -> str:
+def _index_text(at: tuple[Node, ...]) -> str:
     return f"[{', '.join(map(str, at))}]" if at else ""
 
 

@@ -29,7 +29,7 @@ class StateFunction:
     transform: str
     member: str
 
-    def allowed(self, *, complementary: bool) -> str:
+    def allowed_letters(self, *, complementary: bool) -> str:
         """The letters that may occur."""
         return self.own + self.beside[complementary]
 

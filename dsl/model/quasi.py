@@ -20,18 +20,22 @@ class NotLinearError(Exception):
 def virtual(speed: Node) -> tuple[tuple[Node, Node], ...]:
     """Coefficients with the displacements whose rates they multiply; NotLinearError where that is not what it is."""
     flows = sorted((n for n in variables(speed) if _is_flow(n)), key=lambda n: n.number)
+    # quasi(w) of what does not move
     if not flows:
         raise NotLinearError("contains no flow")
+    # sum(i in 1..n: f[i]) has no single displacement
     inside = {n for r in topological([speed]) if r.op == "reduce" for n in variables(r.args[2])}
     if inside & set(flows):
         raise NotLinearError("sums flows over a range: write 'for i in ... { work E on quasi(w[i]) }'")
     found = []
+    # dw is linear in the flows: each has a coefficient and a displacement
     for flow in flows:
         coefficient = derivative(speed, flow)
         if any(_is_flow(n) for n in variables(coefficient)):
             raise NotLinearError(f"is not linear in the flow {flow}")
         family, kind, _ = flow.data
         found.append((coefficient, var(family, _DISPLACEMENTS[kind], *flow.args)))
+    # coefficients read displacements and parameters alone
     for node in sorted(variables(speed), key=lambda n: n.number):
         if node.op == "var" and not _is_flow(node) and (node.data[1] not in _COEFFICIENTS or node.data[2]):
             raise NotLinearError(f"contains {node}, which is neither a flow nor a displacement")

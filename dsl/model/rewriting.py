@@ -107,10 +107,12 @@ def with_literal_ranges(network: Network, number: Callable[[Node], float]) -> Ne
 
     number: the value of an expression of parameters, NaN of another.
     """
+    # most texts have no reduction there
     if all(node.op != "reduce" for node in topological(expressions(network, *DIFFERENTIATED))):
         return network
     done: dict[Node, Node] = {}
 
+    # bounds by parameters become their numbers
     def literal(node: Node, args: tuple[Node, ...]) -> Node:
         if node.op == "reduce" and not (args[0].op == args[1].op == "const"):
             bounds = [number(a) for a in args[:2]]
@@ -119,7 +121,7 @@ def with_literal_ranges(network: Network, number: Callable[[Node], float]) -> Ne
         return rebuild(node, args)
 
     def change(root: Node) -> Node:
-        found = {n: _within(n, literal) for n in _nonlinear(root)}
+        found = {n: _rebuild(n, literal) for n in _nonlinear(root)}
         found = {n: new for n, new in found.items() if new is not n}
         done.update(found)
         return substitute(root, found) if found else root
@@ -128,7 +130,7 @@ def with_literal_ranges(network: Network, number: Callable[[Node], float]) -> Ne
     return replace(new, literal=True) if done else network
 
 
-def _within(root: Node, change: Callable[[Node, tuple[Node, ...]], Node]) -> Node:
+def _rebuild(root: Node, change: Callable[[Node, tuple[Node, ...]], Node]) -> Node:
     made: dict[Node, Node] = {}
     for node in topological([root]):
         made[node] = change(node, tuple(made[a] for a in node.args))
@@ -138,15 +140,20 @@ def _within(root: Node, change: Callable[[Node, tuple[Node, ...]], Node]) -> Nod
 def _nonlinear(root: Node) -> list[Node]:
     """The largest parts with a reduction in which no sum over a range can be taken apart into terms over a loop."""
     reduced = dict[Node, bool]()
+    # which parts have a reduction below them
     for node in topological([root]):
         reduced[node] = node.op == "reduce" or any(reduced[a] for a in node.args)
     found, left = dict[Node, None](), [root] if reduced[root] else []
+    # down from the root, through what is linear in its parts
     while left:
         node = left.pop()
+        # a + b: each by itself
         if node.op == "sum":
             left += [a for a in node.args if reduced[a]]
+        # a sum over a range: its body
         elif node.op == "reduce" and node.data[0] == "sum":
             left += [node.args[2]] if reduced[node.args[2]] else []
+        # factors: whole powers of sums multiply out, others are nonlinear
         elif node.op == "mul":
             for exponent, factor in zip(node.data, node.args, strict=True):
                 whole = exponent > 0 and exponent == int(exponent)
@@ -154,6 +161,7 @@ def _nonlinear(root: Node) -> list[Node]:
                 if reduced[factor]:
                     if whole and apart:
                         left.append(factor)
+                    # tanh(sum(...)): the sum cannot leave the function
                     else:
                         found[factor] = None
         else:
@@ -161,7 +169,7 @@ def _nonlinear(root: Node) -> list[Node]:
     return list(found)
 
 
-def summed(body: Node, loops: Sequence[Loop]) -> Node:
+def sum_over_loops(body: Node, loops: Sequence[Loop]) -> Node:
     """The sum of what stands under loops, over all of them."""
     for loop in reversed(loops):
         body = reduction("sum", loop.index, loop.first, loop.last, body)

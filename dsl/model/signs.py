@@ -45,11 +45,12 @@ def reals(root: Node, known: Mapping[Node, Reals]) -> Reals:
     """Where the values of an expression lie; `known`: those of variables and parameters."""
     found: dict[Node, Reals] = {}
     for node in topological([root]):
-        found[node] = known[node] if node in known else _of(node, [found[a] for a in node.args])
+        found[node] = known[node] if node in known else _reals_of(node, [found[a] for a in node.args])
     return found[root]
 
 
-def _of(node: Node, args: list[Reals]) -> Reals:
+def _reals_of(node: Node, args: list[Reals]) -> Reals:
+    """Where the value of a node lies, from where those of its arguments do; ALL where nothing is known."""
     match node.op:
         case "const":
             return Reals(node.data, node.data, node.data != 0.0)
@@ -61,10 +62,12 @@ def _of(node: Node, args: list[Reals]) -> Reals:
             for e, a in zip(node.data, args, strict=True):
                 total = _times(total, _power(a, e))
             return total
+        # an odd function has the sign of its argument
         case "call" if node.data in _ODD:
             return {1: POSITIVE, -1: NEGATIVE}.get(args[0].sign, ALL)
         case "call":
             return _CALLS.get(node.data, ALL)
+        # either branch
         case "cond":
             one, other = args[1:]
             return Reals(min(one.low, other.low), max(one.high, other.high), one.strict and other.strict)
@@ -73,13 +76,13 @@ def _of(node: Node, args: list[Reals]) -> Reals:
 
 def _sum(parts: Iterable[Reals]) -> Reals:
     parts = list(parts)
-    low, high = _added((p.low for p in parts), -math.inf), _added((p.high for p in parts), math.inf)
+    low, high = _sum_of_ends((p.low for p in parts), -math.inf), _sum_of_ends((p.high for p in parts), math.inf)
     upward = all(p.low >= 0.0 for p in parts) and any(p.sign > 0 for p in parts)
     downward = all(p.high <= 0.0 for p in parts) and any(p.sign < 0 for p in parts)
     return Reals(low, high, upward or downward or low > 0.0 or high < 0.0)
 
 
-def _added(ends: Iterable[float], open_: float) -> float:
+def _sum_of_ends(ends: Iterable[float], open_: float) -> float:
     """The sum of lower or of upper ends; open_: what it is where one of them is that, or it is no double."""
     ends = list(ends)
     try:
@@ -98,12 +101,12 @@ def _power(base: Reals, exponent: float) -> Reals:
         base = Reals(max(base.low, 0.0), max(base.high, 0.0), base.strict)
     if exponent < 0:
         return _reciprocal(_power(base, -exponent), always=exponent != int(exponent) or exponent % 2 == 0)
-    ends = [_raised(x, exponent) for x in (base.low, base.high)]
+    ends = [_saturating_power(x, exponent) for x in (base.low, base.high)]
     low = 0.0 if exponent % 2 == 0 and base.low < 0.0 < base.high else min(ends)
     return Reals(low, max(ends), base.strict)
 
 
-def _raised(x: float, exponent: float) -> float:
+def _saturating_power(x: float, exponent: float) -> float:
     """A power that is no less than zero."""
     try:
         size = abs(x) ** exponent

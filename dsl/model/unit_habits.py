@@ -9,7 +9,7 @@ from __future__ import annotations
 import re
 from functools import cache
 
-from sysdyn.dsl.model.units import NONE, Dimension, known, multiply, names, si_text
+from sysdyn.dsl.model.units import NONE, Dimension, find_unit, multiply, names, si_text
 from sysdyn.values import dataclass
 
 _SUPERSCRIPTS = str.maketrans("⁰¹²³⁴⁵⁶⁷⁸⁹⁻", "0123456789-")
@@ -59,7 +59,7 @@ PREFIXED = {"e3": "kohm", "e6": "Mohm", "e-6": "uF", "e-3": "mH", "e-9": "nF", "
 """A unit with the prefix that stands for a power of ten."""
 
 
-def respelled(text: str) -> str | None:
+def correct_spelling(text: str) -> str | None:
     """A wrong unit as it is meant; None where that is not certain, or where it is right already."""
     whole = _normal(text)
     return whole if whole != text else None
@@ -90,14 +90,16 @@ def _factors(text: str) -> list[str] | None:
         return ["1"]
     found: list[str] = []
     end = 0
+    # name and exponent, without gaps
     for match in _FACTOR.finditer(text):
         if match.start() != end:
             return None
         end = match.end()
         name, exponent = match.groups()
-        parts = [name] if known(name) else _worded(name) or _parted(name)
+        parts = [name] if find_unit(name) else _as_unit_list(name) or _split_units(name)
         if parts is None:
             return None
+        # `kgm2`: the exponent belongs to the last of those that grew together
         if exponent is not None:
             if re.search(r"[/^]", parts[-1]):
                 return None
@@ -106,8 +108,8 @@ def _factors(text: str) -> list[str] | None:
     return found if found and end == len(text) else None
 
 
-def _worded(name: str) -> list[str] | None:
-    found = _word(name) or _cased(name)
+def _as_unit_list(name: str) -> list[str] | None:
+    found = _word(name) or _only_case_variant(name)
     return None if found is None else [found]
 
 
@@ -118,27 +120,29 @@ def _word(name: str) -> str | None:
         return _WORDS[lower]
     if lower == "ohm":
         return "ohm"
+    # `milliamps`: a prefix in words, and a word
     for long, short in _LONG_PREFIXES.items():
         if lower.startswith(long):
             rest = _word(lower[len(long) :])
-            if rest is not None and known(short + rest):
+            if rest is not None and find_unit(short + rest):
                 return short + rest
+    # `kOhm`, `mVolt`: a prefix of one letter, and a word
     tail = lower[1:]
     base = "ohm" if tail == "ohm" else _WORDS.get(tail)
-    return name[0] + base if base and known(name[0] + base) else None
+    return name[0] + base if base and find_unit(name[0] + base) else None
 
 
 _LONG_PREFIXES = {"milli": "m", "micro": "u", "nano": "n", "pico": "p", "kilo": "k", "mega": "M", "giga": "G"}
 _LONG_PREFIXES |= {"centi": "c", "deci": "d"}
 
 
-def _cased(name: str) -> str | None:
+def _only_case_variant(name: str) -> str | None:
     """The unit that differs in upper and lower case alone: `hz`, `RPM`, `KN`, `Kg`, `mhz`; never `Nm` as `nm`."""
-    found = cased(name)
+    found = case_variants(name)
     return found[0] if len(found) == 1 else None
 
 
-def cased(name: str) -> list[str]:
+def case_variants(name: str) -> list[str]:
     """All units that differ in upper and lower case alone, those without a prefix first: `pa` is Pa or pA; none of what
     may be milli or mega.
     """
@@ -150,23 +154,27 @@ def cased(name: str) -> list[str]:
             whole.append(base)
         elif head.lower() == "m" and tail.lower() == base.lower() and base != "l":
             return whole
-        elif base.lower() == tail.lower() and known(prefix + base) and (tail != base or prefix != head):
+        elif base.lower() == tail.lower() and find_unit(prefix + base) and (tail != base or prefix != head):
             prefixed.append(prefix + base)
     return [*whole, *prefixed]
 
 
-def _parted(name: str) -> list[str] | None:
+def _split_units(name: str) -> list[str] | None:
     """A name that has grown together of two or three units, the longest first: `Nm`, `Nms`, `kgm`, `Ah`, `Pas`."""
+    # the longest head that is a unit which occurs in such words
     for end in range(len(name) - 1, 0, -1):
         head, tail = name[:end], name[end:]
         base = head if head in _STRONG else head[1:]
-        if known(head) is None or base not in _STRONG:
+        if find_unit(head) is None or base not in _STRONG:
             continue
+        # `Nms` is N m s, not N times milliseconds
         if tail == "ms":
             return [head, "m", "s"]
-        if known(tail):
+        # `Nm`
+        if find_unit(tail):
             return [head, tail]
-        rest = _parted(tail)
+        # three of them: `kgms`
+        rest = _split_units(tail)
         if rest is not None:
             return [head, *rest]
     return None
@@ -181,7 +189,7 @@ def declaration(name: str) -> str | None:
 _GLUED = re.compile(r"([0-9]+(?:\.[0-9]+)?(?:[eE][+-]?[0-9]+)?)(meg|[kKMGmunpfTgtµ]|Meg|MEG)([0-9]*)$")
 
 
-def scaled(text: str) -> str | None:
+def expand_suffix(text: str) -> str | None:
     """A number with the suffix of a circuit simulator: `10k` is `10e3`, `4u7` is `4.7e-6`; None for anything else."""
     match = _GLUED.match(text)
     if match is None:
@@ -215,7 +223,7 @@ TIMES_TIME = "*t"
 """Behind a unit and a blank `t` is the time, never the tonne: `50 Hz t`."""
 
 
-def chained(text: str, offset: int) -> Chained | None:
+def find_product(text: str, offset: int) -> Chained | None:
     """The quantity around an offset whose unit was written as a product: `3 kN*s/m` or `3 N m`; None where none is."""
     first = text.rfind("\n", 0, offset) + 1
     last = text.find("\n", offset)
@@ -236,7 +244,7 @@ _HEAD = re.compile(r"(?<![\w.])([0-9]+(?:\.[0-9]+)?(?:[eE][+-]?[0-9]+)?)[ \t]+(?
 _TOKEN = re.compile(r"[ \t]*(?:([^\W\d_]+|1(?=[ \t]*/))|([(./*·)])|\^(-?[0-9]+))")
 
 
-def grouped(text: str, offset: int) -> Chained | None:
+def find_parenthesized(text: str, offset: int) -> Chained | None:
     """The quantity (or the unit behind a colon) around an offset whose unit was written with parentheses:
     `30 N/(m.s)`; None where none is.
     """
@@ -244,7 +252,7 @@ def grouped(text: str, offset: int) -> Chained | None:
     last = text.find("\n", offset)
     line = text[first : last if last >= 0 else len(text)]
     for head in _HEAD.finditer(line):
-        found = _ungrouped(line, head.end())
+        found = _expand_parentheses(line, head.end())
         if found is None or not head.start() <= offset - first < found[0] or "(" not in line[head.end() : found[0]]:
             continue
         number, start = head.group(1), head.start() if head.group(1) else head.end()
@@ -252,34 +260,40 @@ def grouped(text: str, offset: int) -> Chained | None:
     return None
 
 
-def _ungrouped(line: str, at: int) -> tuple[int, str] | None:
+def _expand_parentheses(line: str, at: int) -> tuple[int, str] | None:
     """Where a unit with parentheses ends and how it is written without; None where a factor is no unit."""
     factors: list[tuple[str, int]] = []
     signs, sign, begun, end, starts = [1], 1, [0], at, True  # of each open parenthesis: its sign, its first factor
     while (token := _TOKEN.match(line, at)) is not None:
         name, mark, exponent = token.groups()
+        # a unit, above or below by all the parentheses around it
         if name:
-            if known(name) is None and name != "1":
+            if find_unit(name) is None and name != "1":
                 if len(signs) > 1:
                     return None
                 break
             factors.append((name, signs[-1] * sign))
             sign = 1
+        # what stands inside inherits the sign before it
         elif mark == "(":
             signs.append(signs[-1] * sign)
             begun.append(len(factors))
             sign = 1
+        # the group that ends here may get an exponent
         elif mark == ")":
             if len(signs) == 1 or starts:
                 break
             signs.pop()
             last = begun.pop()
+        # '.', '*' or '/': of the next factor
         elif mark:
             if starts:
                 return None
             sign = -1 if mark == "/" else 1
+        # an exponent without a base
         elif starts:
             return None
+        # an exponent: of one factor, or of the group before it
         else:
             whole = len(factors) - 1 if line[at - 1 : at] != ")" else last
             factors[whole:] = [(n, p * int(exponent)) for n, p in factors[whole:]]
@@ -288,6 +302,7 @@ def _ungrouped(line: str, at: int) -> tuple[int, str] | None:
         end = at if len(signs) == 1 and not starts else end
     if len(signs) > 1 or not factors:
         return None
+    # first what stands above, then what is divided by
     real = [(n, p) for n, p in factors if n != "1"]
     above = ".".join(n if p == 1 else f"{n}^{p}" for n, p in real if p > 0)
     below = [(n, -p) for n, p in real if p < 0]
@@ -336,7 +351,7 @@ def common(dimension: Dimension) -> str:
 def _dimension(unit: str) -> Dimension:
     found = NONE
     for sign, name, exponent in re.findall(r"([./]?)([A-Za-z]+)(?:\^([0-9]+))?", unit):
-        factor = known(name)
+        factor = find_unit(name)
         assert factor is not None
         found = multiply(found, factor[0], int(exponent or 1) * (-1 if sign == "/" else 1))
     return found

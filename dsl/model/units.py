@@ -43,7 +43,7 @@ def multiply(a: Dimension, b: Dimension, power: Fraction | int = 1) -> Dimension
     return tuple(sorted((k, v) for k, v in exponents.items() if v))
 
 
-def raised(a: Dimension, power: Fraction | int) -> Dimension:
+def power_of(a: Dimension, power: Fraction | int) -> Dimension:
     """Raise a to a power."""
     return tuple((k, v * power) for k, v in a) if power else NONE
 
@@ -116,7 +116,7 @@ DEGREE_CELSIUS = Unit(_dimension(K=1), _ONE, "degC", Fraction("273.15"))
 
 
 @cache
-def known(name: str) -> tuple[Dimension, Fraction] | None:
+def find_unit(name: str) -> tuple[Dimension, Fraction] | None:
     """Dimension and scale of a unit's name, prefix included; None if there is no such unit."""
     if name in _UNITS:
         return _UNITS[name][:2]

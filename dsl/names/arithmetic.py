@@ -9,7 +9,7 @@ from fractions import Fraction
 from sysdyn.dsl.model import dimensions as dim
 from sysdyn.dsl.model import expression as ex
 from sysdyn.dsl.model.expression import Node
-from sysdyn.dsl.model.units import NONE, Dimension, multiply, raised
+from sysdyn.dsl.model.units import NONE, Dimension, multiply, power_of
 from sysdyn.dsl.names.context import Context, Value
 from sysdyn.dsl.names.symbols import Definition, Typed, Vector
 from sysdyn.dsl.text.diagnostics import Related
@@ -22,10 +22,12 @@ class Arithmetic(Context):
     def _sum(self, e: syntax.Sum) -> Value:
         """Terms of one dimension, or vectors of one length; E203 names the two that differ."""
         values = [self.resolve(t) for _, t in e.terms]
+        # [1, 2] + x[1..2]
         if any(isinstance(v, Vector) for v in values):
             return self._vector_sum(e, values)
         found: Dimension | None = None
         where = e.terms[0][1]
+        # a term without dimension (0, inf) fits any sum
         for (_, term), value in zip(e.terms, values, strict=True):
             assert isinstance(value, Typed)
             self.is_number(value, term)
@@ -57,8 +59,10 @@ class Arithmetic(Context):
         nodes: list[tuple[float, Node]] = []
         dimension: Dimension | None = NONE
         vector: Vector | None = None
+        # dimensions multiply; one that is not known makes the product's unknown
         for op, factor in e.factors:
             value = self.resolve(factor)
+            # 2*[a, b]; of two lists it is said which product is meant
             if isinstance(value, Vector):
                 if vector is not None or op == "/":
                     raise self.fail(
@@ -68,6 +72,7 @@ class Arithmetic(Context):
                 continue
             self.is_number(value, factor)
             power = -1 if op == "/" else 1
+            # x/0, as it is written
             if op == "/" and ex.is_const(value.node) and value.node.data == 0.0:
                 text = self.source.text[factor.span.start : factor.span.end]
                 raise self.fail("E324", f"division by '{text}', which is zero", factor.span)
@@ -80,6 +85,7 @@ class Arithmetic(Context):
         if vector is None:
             return Typed(node, dimension)
         items = []
+        # each element by the factors
         for v in vector.items:
             d = None if v.dimension is None or dimension is None else multiply(dimension, v.dimension)
             items.append(Typed(ex.mul(node, v.node), d))
@@ -95,6 +101,7 @@ class Arithmetic(Context):
     def _power(self, e: syntax.Power) -> Value:
         """The exponent is a number without unit, and a rational constant where the base has a unit (E204)."""
         base, exponent = self.scalar(e.base), self.scalar(e.exponent)
+        # x^(2 m)
         if exponent.dimension not in (None, NONE):
             help_ = None
             if isinstance(e.exponent, syntax.Quantity):
@@ -104,16 +111,19 @@ class Arithmetic(Context):
         if ex.is_const(exponent.node) and not math.isfinite(exponent.node.data):
             message = f"the exponent is {exponent.node.data}: beyond all numbers"
             raise self.fail("E204", message, e.exponent.span, help="a finite exponent")
+        # a number to any power
         if not base.dimension:
             return Typed(ex.power(base.node, exponent.node), base.dimension if exponent.dimension else NONE)
+        # (2 m)^n has a dimension that depends on n
         if not ex.is_const(exponent.node):
             message = f"the exponent must be a rational constant because the base is in {dim.show(base.dimension)}"
             raise self.fail("E204", message, e.exponent.span, help="make the base dimensionless")
+        # m^0.5 and m^(1/3): the dimension's exponents are rational
         exact = Fraction(exponent.node.data).limit_denominator(1000)
         if abs(exact) > 100:
             raise self.fail("E204", f"the exponent {exponent.node} of a quantity is out of reason", e.exponent.span)
         power: Fraction | int = int(exact) if exact.denominator == 1 else exact
-        dimension = tuple((k, int(v) if v == int(v) else v) for k, v in raised(base.dimension, power))
+        dimension = tuple((k, int(v) if v == int(v) else v) for k, v in power_of(base.dimension, power))
         return Typed(ex.power(base.node, exponent.node), dimension)
 
     def _signal_of(self, e: syntax.Expr) -> tuple[str, str] | None:

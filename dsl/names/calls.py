@@ -45,11 +45,11 @@ class Calls(Context):
     def _reduction(self, e: syntax.Reduction) -> Value:
         first, last = self.whole_number(e.lower, "a bound"), self.whole_number(e.upper, "a bound")
         if self._indexes_list(e):
-            return self._unrolled(e, first, last)
+            return self._unroll(e, first, last)
         with self.loop(e.index.name, first, last, unique=True) as loop:
-            return self._reduced(e, loop)
+            return self._reduce_over(e, loop)
 
-    def _reduced(self, e: syntax.Reduction, loop: Loop) -> Typed:
+    def _reduce_over(self, e: syntax.Reduction, loop: Loop) -> Typed:
         """The reduction over a loop in sight, cut where it runs over several statements of one label."""
         try:
             body = self.scalar(e.body)
@@ -58,8 +58,8 @@ class Calls(Context):
                 raise
             parts = []
             for part in several.parts:
-                with self.narrowed(several, part) as inner:
-                    parts.append(self._reduced(e, inner))
+                with self.narrowing(several, part) as inner:
+                    parts.append(self._reduce_over(e, inner))
             nodes = [p.node for p in parts]
             if e.op in ("sum", "prod"):
                 return Typed(ex.add(*nodes) if e.op == "sum" else ex.mul(*nodes), parts[0].dimension)
@@ -79,19 +79,21 @@ class Calls(Context):
                     return True
         return False
 
-    def _unrolled(self, e: syntax.Reduction, first: Node, last: Node) -> Value:
+    def _unroll(self, e: syntax.Reduction, first: Node, last: Node) -> Value:
         """A reduction whose body takes elements of a list: written out, so that its bounds must be numbers (E806)."""
         if not (ex.is_const(first) and ex.is_const(last)):
             message = "the body takes elements of a list, so the bounds must be numbers"
             raise self.fail("E806", message, e.span, help="an array with a formula for its elements")
         budget.charge(budget.NODE * max(last.data - first.data, 0.0), "a range that is written out")
         before, values = self._bound, []
+        # the body once for each number in place of the index
         for k in range(int(first.data), int(last.data) + 1):
             self._bound = {**before, e.index.name: Typed(ex.const(k), NONE)}
             try:
                 values.append(self.scalar(e.body))
             finally:
                 self._bound = before
+        # an empty range: the neutral element
         if not values:
             return Typed(ex.const(0.0 if e.op == "sum" else 1.0), None)
         total = values[0]
@@ -110,25 +112,30 @@ class Calls(Context):
         for arg in e.args:
             if arg.name is not None:
                 raise self.fail("E404", f"functions take their arguments by position, not '{arg.name} ='", arg.span)
+        # what the text declares comes before what the language has
         symbol = self.scope.find(e.name)
         if isinstance(symbol, FunctionSymbol):
             return self._function(symbol, e)
         if isinstance(symbol, TableSymbol):
             return self._table(symbol, e)
+        # `energy_through(cell.a)`: of a port, not a value
         if e.name == "energy_through" and len(e.args) == 1:
             return self.through(e.args[0].value)
         if e.name in ("dot", "cross", "norm"):
             return self._vector_call(e)
         if e.name == "quasi":
             raise self.fail("E319", "quasi(w) is what a work acts on", e.span, help="work E on quasi(w)")
+        # nothing of that name can be called
         if e.name not in dim.FUNCTIONS:
             texts = [self.source.text[a.span.start : a.span.end] for a in e.args]
+            # `R(t)`, `k(x + 1)`: a value followed by parentheses
             if isinstance(symbol, (ParameterSymbol, UnknownSymbol, Definition)):
                 meant = e.name if texts == ["t"] else f"{e.name}*({', '.join(texts)})"
                 raise self.fail("E101", f"'{e.name}' is a value, no function", e.span, help=meant)
+            # `sqr(x)`, `log10(x)`: what other languages have
             remedy = habits.function(e.name, texts)
             if remedy is not None and not self.scope.is_broken(e.name):
-                raise self.remedied("E101", f"unknown function '{e.name}'", e.span, remedy)
+                raise self.fail_with_remedy("E101", f"unknown function '{e.name}'", e.span, remedy)
             near = nearest(e.name, (*dim.FUNCTIONS, *self.scope.names(), "sum", "prod", "dot", "cross", "norm"))
             help_ = f"nearest name in scope: '{near}'" if near else f"fn {e.name}(x: 1) -> 1 = ... declares one"
             if self.scope.is_broken(e.name):
@@ -141,6 +148,7 @@ class Calls(Context):
         name = e.name
         count, _ = dim.FUNCTIONS[name]
         values: list[Typed] = []
+        # max([a, b, c]) takes a list as its arguments
         for arg in e.args:
             value = self.resolve(arg.value)
             if isinstance(value, Vector) and count == -1:
@@ -152,6 +160,7 @@ class Calls(Context):
             shape = f"{name}({', '.join('xyz'[:count]) if count > 0 else 'x, y, ...'})"
             raise self.fail("E206", f"{name} takes {wants}, {len(values)} given", e.span, help=shape)
         common: Dimension | None = None
+        # sin, exp and others take plain numbers; max, hypot arguments of one dimension
         for k, value in enumerate(values):
             where = e.args[min(k, len(e.args) - 1)].value
             if dim.wants_plain(name) and value.dimension not in (None, NONE):
@@ -162,11 +171,12 @@ class Calls(Context):
                 message = f"the arguments of {name} differ: {dim.show(common)} and {dim.show(value.dimension)}"
                 help_ = self.missing(value.dimension, common, where) or f"both in {dim.show(common)}"
                 raise self.fail("E206", message, where.span, help=help_)
+        # an offset, no factor
         if name == "celsius":
             return Typed(ex.add(values[0].node, ex.const(273.15)), dim.result(name, NONE))
         return Typed(ex.call(name, *(v.node for v in values)), dim.result(name, common))
 
-    def _divided(self, e: object) -> str | None:
+    def _hint_of_division(self, e: object) -> str | None:
         """What is meant by a quantity whose last unit is a variable in sight too: `300 K/T` is not divided by it."""
         if not isinstance(e, syntax.Quantity) or len(e.unit.factors) < 2:
             return None
@@ -177,13 +187,16 @@ class Calls(Context):
         return f"'{written}' divides by the variable {last.name}; '{e.text} {e.unit.text}' is one quantity"
 
     def _not_plain(self, name: str, dimension: Dimension | None, e: syntax.Expr) -> None:
+        """Raise E205: a function of plain numbers given a quantity, with the division that makes it plain."""
         text = self.source.text[e.span.start : e.span.end]
         help_ = f"{name}({text}/(1 {dim.show(dimension)}))" if len(text) < 60 else None
-        divided = next(filter(None, map(self._divided, walk(e))), None)
+        divided = next(filter(None, map(self._hint_of_division, walk(e))), None)
+        # `exp(300 K/T)`: meant is 300 K divided by the variable T
         if divided is not None:
             raise self.fail("E205", f"the argument of {name} is in {dim.show(dimension)}", e.span, help=divided)
         if help_ and dimension == dim.TIME:
             help_ += ", or the unit of a frequency: 50 Hz"
+        # sin(50 Hz): a frequency for an angle
         if name in ("sin", "cos") and dimension == dim.quotient(NONE, dim.TIME):
             help_ = f"an angle: {name}({text}*t)" if "pi" in text else f"an angle: {name}(2*pi*{text}*t)"
         raise self.fail("E205", f"the argument of {name} is in {dim.show(dimension)}", e.span, help=help_)
@@ -198,17 +211,20 @@ class Calls(Context):
         b = values[-1].items  # type: ignore[union-attr]
         if len(a) != len(b) or (e.name == "cross" and len(a) != 3):
             raise self.fail("E206", f"the arrays of {e.name} have {len(a)} and {len(b)} elements", e.span)
+        # a x b by its components
         if e.name == "cross":
             at = ((1, 2), (2, 0), (0, 1))
             return Vector(tuple(self.add(_times(a[i], b[j]), _minus(_times(a[j], b[i])), e.span) for i, j in at))
+        # the scalar product, of which norm is the root
         total = _times(a[0], b[0])
         for x, y in zip(a[1:], b[1:], strict=True):
             total = self.add(total, _times(x, y), e.span)
         if e.name == "dot":
             return total
-        return Typed(ex.sqrt(total.node), None if total.dimension is None else dim.halved(total.dimension))
+        return Typed(ex.sqrt(total.node), None if total.dimension is None else dim.square_root(total.dimension))
 
     def _arguments(self, name: str, heads: Sequence[Head], e: syntax.Call) -> list[Value]:
+        """Values of the arguments of a function of the text, each of its parameter's dimension and size (E206)."""
         if len(heads) != len(e.args):
             wants = f"{len(heads)} argument{'s' * (len(heads) != 1)}"
             shape = f"{name}({', '.join(head for head, _, _ in heads)})"
@@ -216,9 +232,11 @@ class Calls(Context):
         values: list[Value] = []
         for (head, dimension, size), arg in zip(heads, e.args, strict=True):
             message = f"argument '{head}' of {name} is in {{}}, wants {dim.show(dimension)}"
+            # one number
             if size is None:
-                values.append(Typed(self.wanted(arg.value, dimension, "E206", message), dimension))
+                values.append(Typed(self.scalar_of(arg.value, dimension, "E206", message), dimension))
                 continue
+            # `v[3]: m`: a list of three
             value = self.resolve(arg.value)
             if not isinstance(value, Vector) or len(value.items) != size:
                 found = f"{len(value.items)} of them" if isinstance(value, Vector) else "one number"
@@ -277,7 +295,7 @@ class Calls(Context):
         try:
             with self.space(space), self.bound(arguments):
                 message = f"function '{name}' is declared {dim.show(result)} but its value is {{}}"
-                return self.wanted(definition.value, result, "E207", message)
+                return self.scalar_of(definition.value, result, "E207", message)
         finally:
             self._active.pop()
 

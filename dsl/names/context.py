@@ -141,7 +141,7 @@ class Context:
         self.statics = False  # static quantities are in sight (expect static)
 
     @contextmanager
-    def within(self, scope: Scope, source: SourceText) -> Iterator[None]:
+    def entering_scope(self, scope: Scope, source: SourceText) -> Iterator[None]:
         """Resolve names in that scope and take spans as parts of that text."""
         before = self.scope, self.source
         self.scope, self.source = scope, source
@@ -221,7 +221,7 @@ class Context:
             self._loops.pop()
             self._bound = before
 
-    def sized(self, node: Node) -> Node:
+    def with_sizes(self, node: Node) -> Node:
         """An index or a bound with the sizes that are given, which what is resolved then depends on."""
         if not ex.is_const(node):
             self.sizes_read = True
@@ -229,7 +229,7 @@ class Context:
         return node
 
     @contextmanager
-    def narrowed(self, several: SeveralError, part: Part) -> Iterator[Loop]:
+    def narrowing(self, several: SeveralError, part: Part) -> Iterator[Loop]:
         """Inside one part of a loop that runs over several statements of a label."""
         k = next(k for k, loop in enumerate(self._loops) if loop.index == several.loop)
         loop = self._loops[k]
@@ -284,11 +284,11 @@ class Context:
     def fail(self, code: str, message: str, at: syntax.Span | Place, **more: object) -> Failed:
         """Report an error at a span of the present text, or at a place; raise what is returned."""
         place = at if isinstance(at, Place) else self.place(at)
-        more.setdefault("subject", habits.blamed(more.get("help")))
+        more.setdefault("subject", habits.unitless_parameter(more.get("help")))
         self.report.error(code, message, place, **more)  # type: ignore[arg-type]
         return Failed()
 
-    def remedied(self, code: str, message: str, span: syntax.Span, remedy: habits.Remedy) -> Failed:
+    def fail_with_remedy(self, code: str, message: str, span: syntax.Span, remedy: habits.Remedy) -> Failed:
         """Report an error whose remedy may be certain; raise what is returned."""
         edit = None
         if remedy.meant is not None:
@@ -328,12 +328,12 @@ class Context:
         help_ = "an element of it: x[1]; sum(i in 1..n: x[i]), norm(x) and dot(x, y) make one number of all"
         return self.fail("E203", message, expression.span, help=help_)
 
-    def wanted(self, expression: syntax.Expr, dimension: Dimension, code: str, message: str) -> Node:
+    def scalar_of(self, expression: syntax.Expr, dimension: Dimension, code: str, message: str) -> Node:
         """A scalar of one dimension; otherwise code with message (its {} is what was found)."""
         return self.fitting(self.scalar(expression), expression, dimension, code, message)
 
     def fitting(self, value: Typed, expression: syntax.Expr, dimension: Dimension, code: str, message: str) -> Node:
-        """The same of a value found before."""
+        """The node of a value found before, of one dimension; else code with message (its {} is what was found)."""
         if value.dimension is not None and value.dimension != dimension:
             help_ = self.missing(value.dimension, dimension, expression)
             said = message if value.dimension else message.replace("in {}", "{}")
@@ -356,11 +356,13 @@ class Context:
     def whole_number(self, expression: syntax.Expr, what: str) -> Node:
         """An index or a bound: made of whole numbers, loop variables and dimensionless parameters."""
         value = self.scalar(expression)
+        # x[2 m]
         if value.dimension not in (None, NONE):
             message = f"{what} is in {dim.show(value.dimension)}, not a number"
             text = " ".join(self.source.text[expression.span.start : expression.span.end].split())
             help_ = f"a number without unit: param {text} = 3" if text.isidentifier() else "a number without unit"
             raise self.fail("E805", message, expression.span, help=help_, subject=f"unit of {text}")
+        # what varies in a run is no index; parameters that are used as one must be whole
         for node in ex.topological([value.node]):
             if node.op in ("var", "time", "table") or (node.op == "param" and node.data in self.discretes):
                 raise self.fail(
@@ -377,6 +379,7 @@ class Context:
                 self.whole.add(node.data)
             if node.op == "const" and node.data != node.data:
                 raise Failed
+        # x[1.5]
         if value.node.op == "const" and not float(value.node.data).is_integer():
             raise self.fail("E805", f"{what} is {value.node.data:g}, no whole number", expression.span)
         return value.node

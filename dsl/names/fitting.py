@@ -8,7 +8,7 @@ from collections.abc import Collection, Iterator, Sequence
 
 from sysdyn.dsl.model import dimensions as dim
 from sysdyn.dsl.model.unit_habits import common
-from sysdyn.dsl.model.units import NONE, Dimension, known, multiply, si_text
+from sysdyn.dsl.model.units import NONE, Dimension, find_unit, multiply, si_text
 from sysdyn.dsl.names import habits
 from sysdyn.dsl.names.symbols import Definition, ParameterSymbol, Scope, UnknownSymbol
 from sysdyn.dsl.text.source import SourceText
@@ -40,19 +40,24 @@ def missing(sight: Sight, have: Dimension | None, want: Dimension | None, *withi
     """
     if have is None or want is None:
         return None
+    # the factor by which either side may be meant to be larger
     pairs = [*zip(within, (dim.quotient(want, have), dim.quotient(have, want)), strict=False)]
-    divided = next(filter(None, (_divided(sight, e, factor) for e, factor in pairs)), None)
+    # `4 N/V` meant as 4 N divided by V
+    divided = next(filter(None, (_hint_of_division(sight, e, factor) for e, factor in pairs)), None)
     divided = divided or _by_quantities(sight, have, want, within)
     if divided:
         return divided
+    # a bare number among the factors: `param R = 5` for 5 ohm
     without = [habits.unitless(*found, factor) for e, factor in pairs if factor and (found := bare(sight, e))]
     turned = [(e, dim.quotient(NONE, factor)) for e, factor in pairs if factor]
     without += [habits.unitless(*found, factor) for e, factor in turned if (found := bare(sight, e, below=True))]
     if without:
         return without[0]
+    # a literal: the unit that it needs
     for e, wanted in zip(within, (want, have), strict=False):
         if isinstance(e.operand if isinstance(e, syntax.Negative) else e, (syntax.Number, syntax.Quantity)):
             return in_unit(e, wanted)
+    # a parameter in sight that has the missing dimension
     for factor in (dim.quotient(want, have), dim.quotient(have, want)):
         level: Scope | None = sight.scope
         while level is not None:
@@ -61,16 +66,18 @@ def missing(sight: Sight, have: Dimension | None, want: Dimension | None, *withi
                     return f"the missing factor is in {dim.show(factor)}: '{s.name}'?"
             level = level.outer
     # a prime is forgotten more often than it is too much
+    # x for x', or x' for x
     rates = [_rate(sight, e, factor, powers) for powers in (-1, 1) for e, factor in pairs]
-    others = [refitted(sight.scope, e, factor) for e, factor in pairs if factor]
+    others = [fitting_unit(sight.scope, e, factor) for e, factor in pairs if factor]
     said = [*filter(None, (*rates, *others))]
+    # a plain number is wanted: divided by its unit
     if not said and within and want == NONE and have:  # a number is wanted
         text = sight.written(within[0])
         said = [f"{text}/(1 {common(have)})"] if len(text) < 40 else []
     return said[0] if said else None
 
 
-def _divided(sight: Sight, expression: syntax.Expr, factor: Dimension) -> str | None:
+def _hint_of_division(sight: Sight, expression: syntax.Expr, factor: Dimension) -> str | None:
     """A quantity by the last unit of which a variable of that name is meant: `4 N/V` beside `param V: m`."""
     stack: list[object] = [expression]
     while stack:
@@ -80,7 +87,7 @@ def _divided(sight: Sight, expression: syntax.Expr, factor: Dimension) -> str | 
         if last is None or last.op != "/" or last.exponent != 1:
             continue
         assert isinstance(e, syntax.Quantity)
-        symbol, unit = sight.scope.find(last.name), known(last.name)
+        symbol, unit = sight.scope.find(last.name), find_unit(last.name)
         own = symbol.dimension if isinstance(symbol, (ParameterSymbol, UnknownSymbol)) and not symbol.shape else None
         if own and unit and factor in ((meant := dim.quotient(unit[0], own)), dim.quotient(NONE, meant)):
             before = e.unit.text.rpartition("/")[0]
@@ -124,9 +131,11 @@ def divided_default(
     while stack:
         e = stack.pop()
         symbol = sight.scope.find(e.name) if isinstance(e, syntax.Name) else None
+        # through definitions to the parameters that they read
         if isinstance(symbol, Definition) and symbol.kind == "let" and symbol.name not in lets:
             lets.add(symbol.name)
             stack.append(symbol.expression)
+        # `param J = 1/12 kg.m^2` is in 1/(kg.m^2): off by the square of its dimension
         elif isinstance(symbol, ParameterSymbol) and symbol.dimension and not symbol.shape:
             twice = multiply(symbol.dimension, symbol.dimension)
             place = symbol.place
@@ -147,7 +156,7 @@ def _dimension(unit: syntax.Unit) -> Dimension | None:
     """The dimension of a unit that is made of the language's own; None for any other."""
     dimension = NONE
     for factor in unit.factors:
-        found = known(factor.name)
+        found = find_unit(factor.name)
         if found is None:
             return None
         dimension = multiply(dimension, found[0], -factor.exponent if factor.op == "/" else factor.exponent)
@@ -171,11 +180,13 @@ def _rate(sight: Sight, expression: syntax.Expr, factor: Dimension, sense: int) 
     """A prime that is missing (sense -1), or one too many (1): an expression is off by a time (or its square), and one
     thing in it moves.
     """
+    # off by s or s^2, in the sense that is asked for
     powers = dict(factor)
     if set(powers) != {"s"} or powers["s"] * sense not in (1, 2):
         return None
     primed, plain = set(), set()
     stack: list[object] = [expression]
+    # names with a prime, and moving names without
     while stack:
         e = stack.pop()
         if isinstance(e, syntax.Prime):
@@ -185,10 +196,12 @@ def _rate(sight: Sight, expression: syntax.Expr, factor: Dimension, sense: int) 
         elif not isinstance(e, (syntax.Member, syntax.Method)):
             stack += children(e)
     found = primed if sense > 0 else plain
+    # of several nobody can say which is meant
     if len(found) != 1:
         return None
     (name,) = found
     moved = sight.scope.find(name)
+    # dynamic s' = s: over a time constant, rather
     if sense < 0 and sight.dynamic and isinstance(moved, UnknownSymbol) and moved.kind == "s":
         unit = "s" if powers["s"] == -1 else "s^2"
         return f"over a time: ({sight.written(expression)})/(1 {unit}), or a parameter in {unit}"
@@ -202,11 +215,13 @@ def bare(sight: Sight, expression: syntax.Expr, *, below: bool = False) -> tuple
     if isinstance(expression, (syntax.Quantity, syntax.Number)):
         return None
     inner: object = expression
+    # signs and parentheses around it
     while isinstance(inner, (syntax.Negative, syntax.Group)):
         inner = inner.operand if isinstance(inner, syntax.Negative) else inner.expr
     single = () if below else (inner,)
     factors = [f for op, f in inner.factors if (op == "/") == below] if isinstance(inner, syntax.Product) else single
     found = []
+    # parameters that are plain numbers
     for factor in factors:
         if isinstance(factor, syntax.Negative):
             factor = factor.operand
@@ -215,6 +230,7 @@ def bare(sight: Sight, expression: syntax.Expr, *, below: bool = False) -> tuple
             found.append(symbol)
     if len(found) != 1 or found[0].name in sight.whole:
         return None
+    # the number, where its declaration gives it on its line
     place = found[0].place
     line = place.source.text[place.span.end :].partition("\n")[0]
     number = re.match(r"\s*=\s*(-?[0-9.]+(?:[eE][+-]?[0-9]+)?)\s*(?:[#;].*)?$", line)
@@ -231,23 +247,24 @@ def in_unit(number: syntax.Expr, wanted: Dimension) -> str:
         return f"write '{text} min', or '{text} s' where seconds are meant"
     if common(wanted) == "K":
         return f"celsius({text}), or '{text} K' where kelvins are meant"
-    return f"write '{text} {_prefixed(inner, common(wanted))}'" if wanted else f"write '{text}', a number"
+    return f"write '{text} {_keep_prefix(inner, common(wanted))}'" if wanted else f"write '{text}', a number"
 
 
-def _prefixed(number: syntax.Number | syntax.Quantity, unit: str) -> str:
+def _keep_prefix(number: syntax.Number | syntax.Quantity, unit: str) -> str:
     """A unit with the prefix that the quantity was written with, where it bears one: uF of `1 uH`."""
     names = [factor.name for factor in number.unit.factors] if isinstance(number, syntax.Quantity) else []
     alone = names[0] if len(names) == 1 and names != ["kg"] else ""  # the k of kg says nothing of sizes
-    whole, base = (known(name) for name in (alone, alone[1:]))
-    prefixed = bool(whole and base and whole[0] == base[0] and whole[1] != base[1] and known(alone[0] + unit))
+    whole, base = (find_unit(name) for name in (alone, alone[1:]))
+    prefixed = bool(whole and base and whole[0] == base[0] and whole[1] != base[1] and find_unit(alone[0] + unit))
     return alone[0] + unit if prefixed else unit
 
 
-def refitted(scope: Scope, expression: syntax.Expr, factor: Dimension) -> str | None:
+def fitting_unit(scope: Scope, expression: syntax.Expr, factor: Dimension) -> str | None:
     """The unit with which a parameter of a product fits, or the factor that is missing in it."""
     inner: object = expression
     while isinstance(inner, (syntax.Negative, syntax.Group)):
         inner = inner.operand if isinstance(inner, syntax.Negative) else inner.expr
+    # a parameter alone
     if isinstance(inner, syntax.Name):
         symbol = scope.find(inner.name)
         if isinstance(symbol, ParameterSymbol) and symbol.dimension:
@@ -256,6 +273,7 @@ def refitted(scope: Scope, expression: syntax.Expr, factor: Dimension) -> str | 
     if not isinstance(inner, syntax.Product):
         return None
     missing = f"a factor in {common(factor)} is missing"
+    # one factor of a product, in another unit of everyday use
     for op, f in inner.factors:
         symbol = scope.find(f.name) if isinstance(f, syntax.Name) else None
         if isinstance(symbol, ParameterSymbol) and symbol.dimension and not symbol.shape:

@@ -6,8 +6,8 @@ import re
 import unicodedata
 from collections.abc import Callable
 
-from sysdyn.dsl.model.unit_habits import UNGROUPED, chained, common, grouped
-from sysdyn.dsl.model.units import Dimension, known
+from sysdyn.dsl.model.unit_habits import UNGROUPED, common, find_parenthesized, find_product
+from sysdyn.dsl.model.units import Dimension, find_unit
 from sysdyn.values import dataclass
 
 _NAMES = {
@@ -98,21 +98,25 @@ class Remedy:
 
 def name(word: str, text: str, offset: int, moves: Callable[[str], bool]) -> Remedy | None:
     """What to write for an unknown name at an offset of a text; moves: whether a name has a rate."""
+    # `xdot`, where x has a rate
     for ending in _ENDINGS:
         base = word.removesuffix(ending)
         if base != word and moves(base):
             return Remedy(f"{base}'", f"{base}'")
+    # `dx`
     if len(word) > 1 and word[0] == "d" and moves(word[1:]):
         return Remedy(f"{word[1:]}'")
-    if known(word) is not None:
-        quantity = grouped(text, offset)
+    # the rest of a unit that was written with spaces or parentheses
+    if find_unit(word) is not None:
+        quantity = find_parenthesized(text, offset)
         if quantity is not None:
             said = f"{quantity.right}: {UNGROUPED}"
             return Remedy(said, quantity.right, (quantity.start, quantity.end))
-        quantity = chained(text, offset)
+        quantity = find_product(text, offset)
         if quantity is not None:
             said = f"{quantity.right}: a unit is written without spaces, its factors are joined by dots"
             return Remedy(said, quantity.right, (quantity.start, quantity.end))
+    # superscripts and fraction signs from other texts
     power = re.match(r"^(.*?)([\u00b2\u00b3\u00b9\u2070-\u2079]+)$", word)
     fraction = unicodedata.normalize("NFKC", word).replace("\u2044", "/")
     if power is not None and power[1]:
@@ -144,7 +148,7 @@ def variable(domain: str, word: str) -> str | None:
     return _VARIABLES.get(domain, {}).get(word)
 
 
-def blamed(said: object) -> str | None:
+def unitless_parameter(said: object) -> str | None:
     """The parameter that `unitless` says the same of, wherever it is read."""
     name, found, _ = said.partition("' is a number without unit") if isinstance(said, str) else ("", "", "")
     return f"unit of {name[1:]}" if found else None

@@ -54,27 +54,34 @@ def law_of(
     node = _in_dimension(context, branch, side, value, wanted)
     own = {n.data[1][1]: n for n in ex.variables(node) if n.op == "var" and n.data[0] == branch.family.name}
     others = sorted(set(own) - {side})
+    # e = R(q) f: q and f against e is a dissipator all the same
     if wanted in (None, "dissipator") and _memristive(side, own, node):
         return LawOf("dissipator", side, node)
+    # one variable against one other of its edge
     if side in own or len(others) > 1:
         names = ", ".join((side, *others))
         raise context.fail(
             "E303", f"the law must be solved for one port variable of its edge; it relates {names}", span
         )
+    # e = 5 V
     if not others:
         return _source(context, branch, side, node, wanted, span)
+    # e against q is potential, f against p kinetic, e against f a dissipator
     kind = _EDGES.get(frozenset((side, others[0])))
     if kind is None:
         raise _off_diagram(context, side, others[0], span)
-    if wanted in ("effort", "flow") and _controlled(context, branch, value, node):
+    # a controlled source may read its own other variable
+    if wanted in ("effort", "flow") and _is_controlled(context, branch, value, node):
         if side != wanted[0]:
             raise context.fail("E303", f"the law of {wanted} source '{branch.name}' gives {side}", span)
         return LawOf(wanted, side, node)
+    # `effort(e = R*f)` is a resistor
     if wanted in ("effort", "flow"):
         help_ = f"that is a {kind}: '{kind}({side} = ...)'"
         raise context.fail(
             "E315", f"source '{branch.name}': its law is a function of its own {others[0]}", span, help=help_
         )
+    # `potential(e = R*f)`
     if wanted is not None and kind != wanted:
         message = f"'{branch.name}' is a {wanted}, but its law relates {side} to its own {others[0]}"
         raise context.fail("E323", message, span, help=f"{kind}({side} = ...)")
@@ -113,7 +120,7 @@ def _in_dimension(context: Context, branch: BranchSymbol, side: str, value: synt
     return context.fitting(read, value, dimension, "E208", message)
 
 
-def _controlled(context: Context, branch: BranchSymbol, value: syntax.Expr, law: Node) -> bool:
+def _is_controlled(context: Context, branch: BranchSymbol, value: syntax.Expr, law: Node) -> bool:
     """Whether a law reads an input, time or another element: that of a controlled source, whatever else it reads."""
     for name in walk(value):
         symbol = context.scope.find(name.name) if isinstance(name, syntax.Name) else None
@@ -180,13 +187,16 @@ def ratio_of(
     name = me.name.partition("#")[0]
     message = f"law of '{name}': {side} is in {dim.show(dimension)}, the law in {{}}"
     with context.virtually():
-        node, signals = signals_held(context.wanted(value, dimension, "E208", message))
+        node, signals = signals_held(context.scalar_of(value, dimension, "E208", message))
+    # what the law reads of the other side, and of its own
     far = {n.data[1][1]: n for n in ex.variables(node) if n.op == "var" and n.data[0] == partner.family.name}
     near = [
         n for n in ex.variables(node) if n.op == "var" and n.data[0] == me.family.name and n.data[1] in ("be", "bf")
     ]
+    # a transformer relates alike variables, a gyrator effort with flow
     expected = letter if kind == "transformer" else REFLECTED[letter]
     wrong = REFLECTED[expected]
+    # the wrong variable of the other side, or none of it
     if expected not in far:
         if wrong in far:
             other = "gyrator" if kind == "transformer" else "transformer"
@@ -195,6 +205,7 @@ def ratio_of(
         needed = f"{expected}{3 - number}"
         message = f"the law of {kind} '{name}' gives {side} without {needed}: its two sides would not act on each other"
         raise context.fail("E303", message, span, help=f"{side} = n*{needed}, with a ratio n other than 0")
+    # linear in the far variable: the slope, and nothing else
     ratio = derivative(node, far[expected])
     rest = ex.substitute(node, {far[expected]: ex.const(0.0)})
     own = [n for n in ex.variables(ratio) if n.op == "var" and n.data[0] in (me.family.name, partner.family.name)]

@@ -50,11 +50,13 @@ class Members(Ports):
 
     def _item(self, e: syntax.Item) -> Value:
         """`x[i]`: an element of a parameter, an unknown, a definition or a vector."""
-        found = self.located(e)
+        found = self.locate(e)
+        # a path to something that was declared
         if found is not None:
             symbol = found.symbol
             if isinstance(symbol, (ParameterSymbol, UnknownSymbol)):
-                return self._changed(self.own_element(symbol, found.indices, e.span), found.change)
+                return self._substitute(self.own_element(symbol, found.indices, e.span), found.change)
+            # a formula with loop variables, at these indices
             if isinstance(symbol, Definition) and symbol.at and not symbol.implied:
                 if len(found.indices) != len(symbol.at):
                     raise self.index_count(symbol.name, len(symbol.at), len(found.indices), e.span)
@@ -62,6 +64,7 @@ class Members(Ports):
                 return self.outside(lambda: self.definition(symbol, at), found.change, e.span)
             if not isinstance(symbol, Definition):
                 return self.value(symbol, e.span)
+        # `[a, b, c][2]`, or a list by its name
         value = self.resolve(e.base)
         if not isinstance(value, Vector):
             raise self.fail("E805", "only an array has elements", e.span)
@@ -78,16 +81,16 @@ class Members(Ports):
         """`base.name`: a meter of the audit, something declared inside an instance, or a quantity of what base is."""
         if isinstance(e.base, syntax.Name) and e.base.name == "audit" and self.scope.find("audit") is None:
             return self._audit(e)
-        whole = self.located(e)
+        whole = self.locate(e)
         if whole is not None:
             return self.outside(lambda: self.value(whole.symbol, e.span), whole.change, e.span)
-        base = self.located(e.base)
+        base = self.locate(e.base)
         if base is None:
             self._lacking(e.base)
             root = _root(e.base)
             if root is not None and root.name not in self._bound and self.scope.find(root.name) is None:
-                raise self.unknown(root.name, root.span)
-            raise self.fail("E102", f"'{self._shown(e.base)}' has no member '{e.name}'", e.span)
+                raise self.report_unknown(root.name, root.span)
+            raise self.fail("E102", f"'{self._excerpt(e.base)}' has no member '{e.name}'", e.span)
         return self._quantity_of(base, e)
 
     def _audit(self, e: syntax.Member) -> Value:
@@ -103,7 +106,7 @@ class Members(Ports):
     def _lacking(self, e: syntax.Expr) -> None:
         """Say what an instance on the way to a part of it lacks; nothing where it could not be made, as was said."""
         while isinstance(e, (syntax.Member, syntax.Item)):
-            outer = self.located(e.base)
+            outer = self.locate(e.base)
             if outer is not None and isinstance(outer.symbol, InstanceSymbol):
                 if not outer.symbol.spaces:
                     raise Failed
@@ -123,12 +126,13 @@ class Members(Ports):
     def _quantity_of(self, base: Located, e: syntax.Member) -> Value:
         """The quantity `e.name` of a coordinate, constraint, node, branch or instance."""
         symbol = base.symbol
-        shown = self._shown(e.base)
+        shown = self._excerpt(e.base)
         match symbol:
             case UnknownSymbol() if symbol.kind == "q":
                 return self._coordinate(symbol, base, e)
             case ConstraintSymbol():
                 return self._constraint_member(symbol, base, e)
+            # its own quantities; what an instance takes in where it is one of its ports
             case NodeSymbol():
                 at = (
                     *symbol.family.prefix,
@@ -137,35 +141,38 @@ class Members(Ports):
                 end = End(symbol, at, symbol.domain)
                 if e.name == ("e" if end.domain.common == "flow" else "f") and self.of_ports(e.base):
                     return self.taken_in(end, e)
-                return self._changed(self.node_quantity(end, e), base.change)
+                return self._substitute(self.node_quantity(end, e), base.change)
+            # inside a component: the node outside
             case PortSymbol():
                 if base.indices:
                     raise self.index_count(symbol.name, 0, len(base.indices), e.span)
                 if e.name == ("e" if symbol.end.domain.common == "flow" else "f"):
                     return self.taken_in(symbol.end, e)
-                return self._changed(self.node_quantity(symbol.end, e), base.change)
+                return self._substitute(self.node_quantity(symbol.end, e), base.change)
+            # R1.e, R1.f, R1.power
             case BranchSymbol():
                 at = self.indices(symbol.name, symbol.family.shape, base.indices, e.span)
-                return self._changed(self.branch_quantity(symbol, at, e.name, e), base.change)
+                return self._substitute(self.branch_quantity(symbol, at, e.name, e), base.change)
             case TwoPortSymbol():
                 return self._two_port(symbol, base, e)
             case InstanceSymbol():
                 return self._instance(symbol, base, e)
             case Unsupported():
                 raise Failed
+        # parameters, definitions and components have no members
         kind = "parameter" if isinstance(symbol, ParameterSymbol) else "value"
-        help_ = self._beside(e)
+        help_ = self._elements_nearby(e)
         if isinstance(symbol, ComponentSymbol) and (near := nearest(e.name, self.scope.names())):
             kind, help_ = "component or model: its names are read by themselves", near
         raise self.fail("E102", f"'{shown}' has no member '{e.name}': it is a {kind}", e.span, help=help_)
 
-    def _beside(self, e: syntax.Member) -> str | None:
+    def _elements_nearby(self, e: syntax.Member) -> str | None:
         """The elements that stand beside a name without members: one of them is meant."""
         inner = e.base.base if isinstance(e.base, syntax.Member) else None
-        outer = None if inner is None else self.located(inner)
+        outer = None if inner is None else self.locate(inner)
         scope = self.scope
         if outer is not None and isinstance(outer.symbol, InstanceSymbol):
-            scope = self.entered(outer.symbol, outer, e.span)[0].scope
+            scope = self.space_of(outer.symbol, outer, e.span)[0].scope
         names = [n for n in (scope.symbols if scope is not self.scope else scope.names()) if n]
         found = [n for n in names if isinstance(scope.find(n), _ELEMENTS)]
         return f"elements that have members: {', '.join(found[:10])}" if found else None
@@ -173,9 +180,10 @@ class Members(Ports):
     def _coordinate(self, symbol: UnknownSymbol, base: Located, e: syntax.Member) -> Value:
         """e, f, p or q of a coordinate."""
         at = (*symbol.family.prefix, *self.indices(symbol.name, symbol.shape, base.indices, e.span))
-        return self._changed(self.coordinate_quantity(symbol, at, e), base.change)
+        return self._substitute(self.coordinate_quantity(symbol, at, e), base.change)
 
     def _two_port(self, symbol: TwoPortSymbol, base: Located, e: syntax.Member) -> Value:
+        """Member of a transformer or gyrator: e1, f2, ... of a side, or what both sides absorb."""
         members = {f"{letter}{k}": (letter, k) for k in (1, 2) for letter in "efqp"}
         if e.name in ("power", "energy"):  # what both sides absorb: zero, but for what a run leaves of it
             both = []
@@ -183,48 +191,56 @@ class Members(Ports):
                 at = self.indices(symbol.name, branch.family.shape, base.indices, e.span)
                 both.append(self.branch_quantity(branch, at, e.name, e))
             whole = Typed(ex.add(*(side.node for side in both)), both[0].dimension)
-            return self._changed(whole, base.change)
+            return self._substitute(whole, base.change)
         if e.name not in members:
             raise self.no_member(symbol.name, e, (*members, "power", "energy"))
         letter, k = members[e.name]
         branch = symbol.branches[k - 1]
         at = self.indices(symbol.name, branch.family.shape, base.indices, e.span)
-        return self._changed(self.branch_quantity(branch, at, letter, e), base.change)
+        return self._substitute(self.branch_quantity(branch, at, letter, e), base.change)
 
     def _instance(self, symbol: InstanceSymbol, base: Located, e: syntax.Member) -> Value:
         """A member of an instance: a quantity of its branch, or what its component declares."""
-        space, change = self.entered(symbol, base, e.base.span)
+        space, change = self.space_of(symbol, base, e.base.span)
         branch = space.scope.symbols.get("")
+        # a quantity of the component's own branch
         if isinstance(branch, BranchSymbol) and e.name in BRANCH:
-            return self._changed(self.branch_quantity(branch, (), e.name, e), change)
+            return self._substitute(self.branch_quantity(branch, (), e.name, e), change)
         if space.scope.is_broken(e.name):
             raise Failed
         level = f" at level {space.level}" if space.level else ""
+        # another level has it: noted where scenes may be run at several levels
         if e.name in space.elsewhere and self.lenient:
-            message = f"'{self._shown(e.base)}' has no '{e.name}'{level}: left out"
+            message = f"'{self._excerpt(e.base)}' has no '{e.name}'{level}: left out"
             self.report.note("N905", message, self.place(e.span))
             raise Failed
         if e.name in space.elsewhere:
-            message = f"'{self._shown(e.base)}' has no member '{e.name}'{level}"
+            message = f"'{self._excerpt(e.base)}' has no member '{e.name}'{level}"
             raise self.fail("E102", message, e.span, help=f"level {space.elsewhere[e.name]} has it")
+        # `R1.v`: the error of the branch names e
         if isinstance(branch, BranchSymbol) and habits.variable(branch.domain.name, e.name) is not None:
-            return self._changed(self.branch_quantity(branch, (), e.name, e), change)  # which says what is meant
+            return self._substitute(self.branch_quantity(branch, (), e.name, e), change)  # which says what is meant
+        # a near name, or a list of what is there
         names = [n for n in space.scope.symbols if n]
         near = nearest(e.name, (*names, *BRANCH) if branch is not None else names)
         listed = (*branch_words(branch.domain), *names) if isinstance(branch, BranchSymbol) else names
         help_ = f"nearest: '{near}'" if near else f"it has {', '.join(listed[:20])}"
         ports = [n for n, s in space.scope.symbols.items() if isinstance(s, PortSymbol)]
         if branch is None and ports and e.name in ("power", "energy", "energy_through"):
-            shown = self._shown(e.base)
+            shown = self._excerpt(e.base)
             through = " + ".join(f"energy_through({shown}.{port})" for port in ports[:4])
             help_ = f"what goes in by its ports: {through}; or of an element inside, {shown}.LABEL.energy"
+        # an energy or power of what has several ends: of elements inside
         if branch is None and e.name in MEMBERS:
-            help_ = self._holders(space, self._shown(e.base), e.name)
+            help_ = self._holders(space, self._excerpt(e.base), e.name)
         if branch is None and ports and e.name in ("e", "f", "q", "p"):  # several ends have one each
-            shown, inside = self._shown(e.base), [n for n, s in space.scope.symbols.items() if isinstance(s, _ELEMENTS)]
+            shown, inside = (
+                self._excerpt(e.base),
+                [n for n, s in space.scope.symbols.items() if isinstance(s, _ELEMENTS)],
+            )
             help_ = " or ".join(f"{shown}.{port}.{e.name}" for port in ports[:4])
             help_ += f"; of an element inside, {shown}.{inside[0]}.{e.name}" if inside else ""
-        raise self.fail("E102", f"'{self._shown(e.base)}' has no member '{e.name}'{level}", e.span, help=help_)
+        raise self.fail("E102", f"'{self._excerpt(e.base)}' has no member '{e.name}'{level}", e.span, help=help_)
 
     def _holders(self, space: Space, shown: str, name: str) -> str:
         """The elements of an instance that have the state function `name`, to write."""
@@ -266,6 +282,7 @@ class Members(Ports):
             raise NotYetError(symbol.name, span)
         if len(found[0].at) != len(at):
             raise self.index_count(symbol.name, len(found[0].at), len(at), span)
+        # the statement whose indices fit: rod[i], or rod[1] by itself
         for constraint in found:
             change: dict[Node, Node] = {}
             fits = True
@@ -281,19 +298,21 @@ class Members(Ports):
 
     def _method(self, e: syntax.Method) -> Value:
         """`label.on(x)`: the effort of a constraint on a coordinate."""
-        base = self.located(e.base)
+        base = self.locate(e.base)
         if base is None and isinstance(e.base, syntax.Name) and self.scope.is_broken(e.base.name):
             raise Failed  # its statement was told
         symbol = None if base is None else base.symbol
         wrong = not isinstance(symbol, ConstraintSymbol) or symbol.kind == "gamma"
+        # a gamma has no multiplier
         if isinstance(symbol, ConstraintSymbol) and symbol.kind == "gamma" and e.name == "on":
             message = f"gamma '{symbol.name}' acts along nothing: it closes an implicit unknown, and has no multiplier"
             help_ = f"phi {symbol.name}: ... where it ties displacements, psi where it ties flows"
             raise self.fail("E102", message, e.span, help=help_)
+        # anything but label.on(expr)
         if base is None or wrong or e.name != "on" or len(e.args) != 1:
             help_ = "label.on(expr) of a phi or psi"
             if e.name == "energy_through" and len(e.args) == 1:
-                help_ = f"energy_through({self._shown(e.base)}.{self._shown(e.args[0].value)})"
+                help_ = f"energy_through({self._excerpt(e.base)}.{self._excerpt(e.args[0].value)})"
             raise self.fail("E102", f"there is no '{e.name}(...)' here", e.span, help=help_)
         assert isinstance(symbol, ConstraintSymbol)
         at = (*symbol.family.prefix, *(self.index(i) for i in base.indices))
@@ -303,6 +322,7 @@ class Members(Ports):
         if target.dimension is None or not any(n.op == "var" for n in ex.variables(target.node)):
             help_ = "a coordinate, or an expression of some, that it acts along"
             raise self.fail("E203", "a constant has no displacement", e.args[0].span, help=help_)
+        # multiplier times the gradient along the target
         node = reaction(residual, symbol.kind == "phi", target.node, self.multiplier(symbol, at))
         return Typed(node, dim.quotient(dim.ENERGY, target.dimension))
 

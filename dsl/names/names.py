@@ -12,7 +12,7 @@ from sysdyn.dsl.model import dimensions as dim
 from sysdyn.dsl.model import expression as ex
 from sysdyn.dsl.model.calculus import time_derivative
 from sysdyn.dsl.model.expression import Node
-from sysdyn.dsl.model.units import NONE, known
+from sysdyn.dsl.model.units import NONE, find_unit
 from sysdyn.dsl.names import habits
 from sysdyn.dsl.names.context import Context, Use, Value
 from sysdyn.dsl.names.failures import Failed, NotYetError, SeveralError, circular
@@ -48,7 +48,7 @@ VALUES = ("t", "pi", "inf")
 ELEMENTS = (BranchSymbol, TwoPortSymbol, InstanceSymbol)
 
 
-def _scaled(text: str, scale: Fraction) -> float:
+def _times_scale(text: str, scale: Fraction) -> float:
     """The double nearest to a number, as written, times a scale."""
     power = _power_of_ten(scale)
     if power is None or not text.replace(".", "").isdecimal():
@@ -87,7 +87,7 @@ class Names(Context):
             help_ = f"celsius({e.text})"
             raise self.fail("E201", "degC is no unit of a quantity: its zero is not 0 K", e.span, help=help_)
         self._looks_like_division(e)
-        value = e.value if unit.scale == 1 else _scaled(e.text, unit.scale)
+        value = e.value if unit.scale == 1 else _times_scale(e.text, unit.scale)
         found = Typed(ex.const(value), unit.dimension)
         if "$" not in e.unit.text:
             self._quantities[key] = scope, found
@@ -99,7 +99,7 @@ class Names(Context):
         if len(e.unit.factors) < 2 or last.op != "/" or last.exponent != 1:
             return
         symbol = self.scope.find(last.name)
-        own = known(last.name)
+        own = find_unit(last.name)
         if isinstance(symbol, ParameterSymbol) and not symbol.shape and own is not None and symbol.dimension == own[0]:
             before = e.unit.text.rpartition("/")[0]
             message = f"in '{e.text} {e.unit.text}' {last.name} is the unit; a variable {last.name} is in scope"
@@ -120,10 +120,10 @@ class Names(Context):
             return self._bound[e.name]
         symbol = self.scope.find(e.name)
         if symbol is None or (e.name in VALUES and isinstance(symbol, ELEMENTS)):
-            return self._predefined(e.name, e.span)
+            return self._predefined_value(e.name, e.span)
         return self.value(symbol, e.span)
 
-    def _predefined(self, name: str, span: syntax.Span) -> Value:
+    def _predefined_value(self, name: str, span: syntax.Span) -> Value:
         """What a word of the language itself stands for: t, pi, inf."""
         match name:
             case "t":
@@ -132,15 +132,17 @@ class Names(Context):
                 return Typed(ex.const(math.pi), NONE)
             case "inf":
                 return Typed(ex.const(math.inf), None)
+            # names that have members only
             case "ground" | "audit":
                 members = "its nodes' potential is zero" if name == "ground" else "write audit.energy or another member"
                 raise self.fail("E104", f"'{name}' is not a value", span, help=members)
         if self.statics and name in STATICS:
             return Typed(ex.param(f"static {name}"), NONE)
-        raise self.unknown(name, span)
+        raise self.report_unknown(name, span)
 
-    def unknown(self, name: str, span: syntax.Span) -> Failed:
+    def report_unknown(self, name: str, span: syntax.Span) -> Failed:
         """Report a name that stands for nothing (E101, E905; E908 among static quantities)."""
+        # its declaration is wrong and reported: no second finding
         if self.scope.is_broken(name):
             return Failed()
         if self.statics:
@@ -149,16 +151,18 @@ class Names(Context):
             text = "'ground' is not a value: it is the reference of every domain"
             return self.fail("E104", text, span, help="0: its effort, flow and displacement are zero")
         code, message = self._unknown
+        # a name of other languages: `xdot`, `PI`
         remedy = habits.name(name, self.source.text, span.start, self._moves)
         if remedy is not None:
-            return self.remedied(code, message.format(name), span, remedy)
+            return self.fail_with_remedy(code, message.format(name), span, remedy)
         if name in dim.FUNCTIONS:
             said = {"celsius": "celsius(20)"}.get(name, f"{name}(...)")
             return self.fail(code, message.format(name), span, help=f"a function: {said}")
+        # a name that differs by little, or the line that would declare it
         near = nearest(name, (*self.scope.names(), *self._bound, "t", "pi", "inf"))
         near = None if code == "E905" and name in habits.RESULTS else near
         help_ = f"nearest name in scope: '{near}'" if near else f"declare it by param {name} = ..., let, coord or node"
-        if known(name) is not None:
+        if find_unit(name) is not None:
             help_ += f"; the unit stands behind a number, with a space: 1 {name}"
         if code == "E905" and not near:
             help_ = habits.RESULTS.get(name, f"let {name} = ... in the model; sysdyn list FILE shows what can be read")
@@ -174,17 +178,20 @@ class Names(Context):
     def value(self, symbol: Symbol, span: syntax.Span) -> Value:
         """What a symbol is worth by itself; E104 where it has members only."""
         match symbol:
+            # a number or an unknown; an array as a list where its size is a number
             case ParameterSymbol() | UnknownSymbol():
-                return self._expanded(symbol, span) if symbol.shape else self.element(symbol, ())
+                return self._array_value(symbol, span) if symbol.shape else self.element(symbol, ())
+            # its expression, with the indices of the loops around
             case Definition():
                 if symbol.at and not symbol.implied:
-                    raise self._unnamed(symbol.name, span)
-                return self.definition(symbol, self._implied(symbol, span) if symbol.implied else None)
+                    raise self._report_array(symbol.name, span)
+                return self.definition(symbol, self._implicit_indices(symbol, span) if symbol.implied else None)
             case Unsupported():
                 raise Failed  # its declaration has been reported as N608
             case BundleNode():
                 names = ", ".join(f"{symbol.name}.{m}" for m in symbol.members)
                 raise self.fail("E104", f"'{symbol.name}' is a bundle, not a value", span, help=f"its nodes: {names}")
+            # nodes, constraints and elements: the member that may be meant
             case NodeSymbol() | PortSymbol():
                 domain = symbol.domain if isinstance(symbol, NodeSymbol) else symbol.end.domain
                 shown = " ".join(self.source.text[span.start : span.end].split())
@@ -198,6 +205,7 @@ class Names(Context):
                 outputs = [n for n, d in said.items() if isinstance(d, Definition) and d.kind == "output"]
                 help_ = "a member: " + " or ".join(f"{symbol.name}.{n}" for n in outputs or ("e", "f"))
                 raise self.fail("E104", f"element '{symbol.name}' is not a value", span, help=help_)
+            # kinds of things, tables and functions without arguments
             case DomainSymbol() | BundleSymbol() | ComponentSymbol() | TableSymbol() | FunctionSymbol():
                 remedy = habits.name(symbol.name, self.source.text, span.start, self._moves)
                 message, called = f"'{symbol.name}' is not a value", None
@@ -206,23 +214,23 @@ class Names(Context):
                     listed = ", ".join(head[0] if isinstance(head, tuple) else head.name for head in heads)
                     called = f"its value at an argument: {symbol.name}({listed})"
                 if remedy:
-                    raise self.remedied("E104", message, span, remedy)
+                    raise self.fail_with_remedy("E104", message, span, remedy)
                 raise self.fail("E104", message, span, help=called)
 
-    def _implied(self, symbol: Definition, span: syntax.Span) -> tuple[Node, ...]:
+    def _implicit_indices(self, symbol: Definition, span: syntax.Span) -> tuple[Node, ...]:
         if not all(name in self._bound for name in symbol.at):
             help_ = f"behind its '}}' stands what is one of a kind; of all of them: sum({symbol.at[-1]} in 1..n: ...)"
             said = f"'{symbol.name}' is known only inside its 'for {symbol.at[-1]}'"
             raise self.fail("E101", said, span, help=help_)
         return tuple(v.node for name in symbol.at if isinstance(v := self._bound[name], Typed))
 
-    def _expanded(self, symbol: ParameterSymbol | UnknownSymbol, span: syntax.Span) -> Vector:
+    def _array_value(self, symbol: ParameterSymbol | UnknownSymbol, span: syntax.Span) -> Vector:
         """A whole array as a value: where its bounds are written as numbers; of parameters with the sizes given."""
         bounds: tuple[Node, ...] = symbol.shape[0] if len(symbol.shape) == 1 else ()
         if isinstance(symbol, ParameterSymbol):
-            bounds = tuple(self.sized(b) for b in bounds)
+            bounds = tuple(self.with_sizes(b) for b in bounds)
         if not bounds or not all(ex.is_const(b) for b in bounds):
-            raise self._unnamed(symbol.name, span)
+            raise self._report_array(symbol.name, span)
         return self._elements(symbol, bounds)
 
     def _elements(self, symbol: ParameterSymbol | UnknownSymbol, bounds: Sequence[Node]) -> Vector:
@@ -231,7 +239,7 @@ class Names(Context):
         budget.charge(budget.NODE * max(last - first, 0), f"the elements of '{symbol.name}' one by one")
         return Vector(tuple(self.element(symbol, (ex.const(i),)) for i in range(first, last + 1)), first)
 
-    def _unnamed(self, name: str, span: syntax.Span) -> Failed:
+    def _report_array(self, name: str, span: syntax.Span) -> Failed:
         """Report E806: an array where one of its elements is wanted."""
         return self.fail("E806", f"'{name}' is an array: name the element", span, help=f"{name}[i] in a sum or a 'for'")
 
@@ -265,12 +273,14 @@ class Names(Context):
         """The expression of a definition, resolved once where it was written (where a loop runs over several statements
         of a label that it reads, in each of its parts); E105 where it needs itself.
         """
+        # let a = b, let b = a
         if symbol in self._active:
             place = Place(symbol.space.source, symbol.span)
             message, help_ = circular(self._active[self._active.index(symbol) :])
             self.report.error("E105", message, place, help=help_)
             raise Failed
         key = symbol, self.virtual
+        # resolved before; None: with an error, which is reported
         if key in self._values:
             value = self._values[key]
             if value is None:
@@ -278,24 +288,27 @@ class Names(Context):
             return value
         self._values[key], before = None, self.chosen_read
         self._active.append(symbol)
+        # loop variables of the definition stand for themselves until indices are given
         placeholders = {n: Typed(ex.index(f"{symbol.name}.{n}"), NONE) for n in symbol.at}
         try:
             loops = symbol.loops or symbol.space.loops
             sight = {**symbol.space.bound, **dict(symbol.bound), **placeholders}
             around = self.space(symbol.space), self.inside(loops, sight), self.aside()
-            budget.within(len(self._active), "definitions are")
+            budget.check_depth(len(self._active), "definitions are")
             with around[0], around[1], around[2] as self._derived[key]:
                 value = self.resolve(symbol.expression)
-                value = self._declared(symbol, value)
+                value = self._check_declaration(symbol, value)
                 if symbol.beside is not None and isinstance(value, Typed):
                     value = Typed(ex.add(value.node, symbol.beside), value.dimension, value.truth)
                 if self.virtual and symbol.kind in ("output", "input"):
                     value = _signal(value)
+        # a range over several statements of one label: its reader knows which part it means
         except SeveralError as several:
             del self._values[key]  # where it is read, the range is known
             if any(several.loop == n.node.data for n in placeholders.values()):
                 raise self.spread(several, symbol.span) from None
             raise
+        # reads what is not known yet: again when it is
         except NotYetError:
             del self._values[key]
             raise
@@ -305,22 +318,26 @@ class Names(Context):
         finally:
             self._active.pop()
         self._values[key] = value
+        # depends on the part of a loop that is read: not kept
         if self.chosen_read != before:
             del self._values[key]
         return value
 
-    def _declared(self, symbol: Definition, value: Value) -> Value:
+    def _check_declaration(self, symbol: Definition, value: Value) -> Value:
         """A value as its declaration wants it: of its dimension (E207), an input's of its shape (E805)."""
         items = value.items if isinstance(value, Vector) else (value,)
         wrong = next((i.dimension for i in items if i.dimension not in (None, symbol.dimension)), None)
+        # `input u: N = 3 m`
         if symbol.dimension is not None and wrong is not None:
             declared = dim.show(symbol.dimension)
             message = f"{symbol.kind} '{symbol.name}' is declared {declared} but set to {dim.show(wrong)}"
             help_ = self.missing(wrong, symbol.dimension, symbol.expression)
             raise self.fail("E207", message, symbol.expression.span, help=help_)
+        # only an input says its size
         if symbol.kind != "input" or (not symbol.shape and isinstance(value, Typed)):
             return value
         message = f"input '{symbol.name}' is one number, not an array"
+        # a list of the declared length
         if symbol.shape:
             (first, last), *others = symbol.shape
             size = last.data - first.data + 1 if ex.is_const(first) and ex.is_const(last) and not others else None
@@ -380,9 +397,9 @@ class Names(Context):
         """`x[1..3]`: the elements between two numbers, whatever size the array has."""
         bounds = [self.index(b) for b in (index.lower, index.upper)]
         if isinstance(symbol, ParameterSymbol):
-            bounds = [self.sized(b) for b in bounds]
+            bounds = [self.with_sizes(b) for b in bounds]
         if not all(ex.is_const(b) for b in bounds):
-            return self.slice(self._expanded(symbol, span), index)
+            return self.slice(self._array_value(symbol, span), index)
         for bound in bounds:
             self.uses.append(Use(symbol.shape[0], bound, self.loops, symbol.name, self.place(index.span)))
         return self._elements(symbol, bounds)

@@ -34,7 +34,7 @@ class Located:
 class Paths(Names):
     """What a path leads to, and values of what lies inside instances."""
 
-    def located(self, e: syntax.Expr) -> Located | None:
+    def locate(self, e: syntax.Expr) -> Located | None:
         """The symbol that a path leads to; None where it leads to a quantity or is no path."""
         match e:
             case syntax.Name():
@@ -43,10 +43,10 @@ class Paths(Names):
                 symbol = self.scope.find(e.name)
                 return None if symbol is None else Located(symbol, (), {})
             case syntax.Item():
-                base = self.located(e.base)
+                base = self.locate(e.base)
                 return None if base is None or base.indices else Located(base.symbol, e.indices, base.change)
             case syntax.Member():
-                base = self.located(e.base)
+                base = self.locate(e.base)
                 return None if base is None else self._inside(base, e)
         return None
 
@@ -57,12 +57,12 @@ class Paths(Names):
             member = symbol.members.get(e.name)
             return None if member is None else Located(member, base.indices, base.change)
         if isinstance(symbol, InstanceSymbol):
-            space, change = self.entered(symbol, base, e.base.span)
+            space, change = self.space_of(symbol, base, e.base.span)
             inner = space.scope.symbols.get(e.name)
             return None if inner is None else Located(inner, (), change)
         return None
 
-    def entered(self, symbol: InstanceSymbol, base: Located, span: syntax.Span) -> tuple[Space, dict[Node, Node]]:
+    def space_of(self, symbol: InstanceSymbol, base: Located, span: syntax.Span) -> tuple[Space, dict[Node, Node]]:
         """The space of an instance under the indices given."""
         if not symbol.spaces:
             self.awaken(symbol)
@@ -86,27 +86,30 @@ class Paths(Names):
         """The statement of a label that an element comes from; SeveralError where a loop runs over several, E805 where
         sizes without a value leave it open.
         """
+        # parts of a loop that were chosen around
         for k, a in enumerate(at):
             chosen = self.chosen.get((id(symbol), k, a))
             if chosen is not None:
                 self.chosen_read += 1
                 spaces = [s for s in spaces if any(s is c for c in chosen)]
+        # an index that runs over several statements: R[1..3] and R[4..9] written apart
         for k, a in enumerate(at) if len(spaces) > 1 else ():
             loop = next((n for n in ex.topological([a]) if n.op == "index"), None)
             ranges = tuple(dict.fromkeys(_range(s, k, len(at)) for s in spaces))
-            if loop is not None and len(ranges) > 1 and (len(at) == 1 or self._apart(ranges)):
+            if loop is not None and len(ranges) > 1 and (len(at) == 1 or self._are_disjoint(ranges)):
                 offset = ex.sub(a, loop)
                 alike = [tuple(s for s in symbol.spaces if _range(s, k, len(at)) == bounds) for bounds in ranges]
                 cut = [Part(s, *(ex.sub(b, offset) for b in bounds)) for s, bounds in zip(alike, ranges, strict=True)]
                 met = [part for part in cut if self._meets(loop, part, sized=len(at) > 1)]
                 raise SeveralError(symbol.name, (id(symbol), k, a), loop.data, tuple(met or cut[:1]))
+        # the statement whose range holds the index
         inside = [s for s in spaces if self._holds(s, at)]
         if not inside:
             message = f"which statement of '{symbol.name}' has the element [{', '.join(map(str, at))}] is not known"
             raise self.fail("E805", message, span, help="an index that the bounds of one of them hold")
         return inside[0]
 
-    def _apart(self, ranges: tuple[tuple[Node, Node], ...]) -> bool:
+    def _are_disjoint(self, ranges: tuple[tuple[Node, Node], ...]) -> bool:
         """Whether no two ranges share a number, with the sizes given."""
         pairs = itertools.combinations(ranges, 2)
         return not any(self._before(a[1], b[0]) is False and self._before(b[1], a[0]) is False for a, b in pairs)
@@ -121,7 +124,7 @@ class Paths(Names):
 
     def _before(self, a: Node, b: Node, *, sized: bool = True) -> bool | None:
         """Whether a < b; None where the sizes given (or numbers alone) do not say."""
-        gap = self.sized(ex.sub(b, a)) if sized else ex.sub(b, a)
+        gap = self.with_sizes(ex.sub(b, a)) if sized else ex.sub(b, a)
         return bool(gap.data > 0) if ex.is_const(gap) else None
 
     def _holds(self, space: Space, at: tuple[Node, ...]) -> bool | None:
@@ -138,7 +141,7 @@ class Paths(Names):
 
     def _between(self, index: Node, first: Node, last: Node) -> bool | None:
         """Whether an index lies between bounds, with the sizes given; None where these do not say."""
-        gaps = [self.sized(ex.sub(index, first)), self.sized(ex.sub(last, index))]
+        gaps = [self.with_sizes(ex.sub(index, first)), self.with_sizes(ex.sub(last, index))]
         if any(ex.is_const(gap) and gap.data < 0 for gap in gaps):
             return False
         return True if all(map(ex.is_const, gaps)) else None
@@ -154,7 +157,7 @@ class Paths(Names):
         loop of its own is told by these: by a number, of one of them, by a loop around, in each part of that.
         """
         try:
-            return self._changed(read(), change)
+            return self._substitute(read(), change)
         except SeveralError as several:
             given = change.get(ex.index(several.loop))
             if given is None:
@@ -170,7 +173,7 @@ class Paths(Names):
             with self.choosing(several, held[0]):
                 return self.outside(read, change, span)
 
-    def _changed(self, value: Value, change: dict[Node, Node]) -> Value:
+    def _substitute(self, value: Value, change: dict[Node, Node]) -> Value:
         if not change:
             return value
         if isinstance(value, Vector):

@@ -1,6 +1,6 @@
 """Ports: `M.shaft.e`, `X.p[2].f`, `energy_through(M.shaft)`: what a component takes in there.
 
-Received: a path to a port and its quantity; handed on: an expression of what is inside, made by `taken`
+Received: a path to a port and its quantity; handed on: an expression of what is inside, made by `effort_into`
 (elaborate/instances/port_efforts.py).
 """
 
@@ -45,7 +45,7 @@ class Ports(Quantities):
     def taken_in(self, end: End, e: syntax.Member) -> Value:
         """The effort that a common-flow node exerts on a component at a port, the flow into it from another node."""
         if not self.said:
-            message = f"'{self._shown(e.base)}' has no member '{e.name}' here: what goes through a port is a result"
+            message = f"'{self._excerpt(e.base)}' has no member '{e.name}' here: what goes through a port is a result"
             raise self.fail("E102", message, e.span, help="traces and claims of a scene read it, LABEL.PORT." + e.name)
         domain, taken = end.domain, self._port(e.base).taken
         return Typed(taken(rates=True), (domain.effort if domain.common == "flow" else domain.flow).dimension)
@@ -65,28 +65,31 @@ class Ports(Quantities):
     def of_ports(self, e: syntax.Expr) -> bool:
         """Whether `label.name[i]` is of a port that is an array, which goes by the nodes that it is bound to."""
         inner = e.base if isinstance(e, syntax.Item) else e
-        owner = self.located(inner.base) if isinstance(inner, syntax.Member) else None
+        owner = self.locate(inner.base) if isinstance(inner, syntax.Member) else None
         if owner is None or not isinstance(owner.symbol, InstanceSymbol) or not isinstance(inner, syntax.Member):
             return False
-        space, _ = self.entered(owner.symbol, owner, inner.span)
+        space, _ = self.space_of(owner.symbol, owner, inner.span)
         return _array_of(space, inner.name) is not None
 
     def _port(self, e: syntax.Expr) -> _Port:
         """`instance.port`, `instance.port[i]`."""
         inner, indices = (e.base, e.indices) if isinstance(e, syntax.Item) else (e, ())
         names, owner, base = list[str](), inner, None
+        # the instance, and the names behind it: port, or bundle and member
         while isinstance(owner, syntax.Member) and not (base and isinstance(base.symbol, InstanceSymbol)):
             names, owner = [owner.name, *names], owner.base
-            base = self.located(owner)
+            base = self.locate(owner)
         if base is None or not isinstance(base.symbol, InstanceSymbol):
-            raise self.fail("E102", f"'{self._shown(e)}' is no port of a component", e.span, help="LABEL.PORT")
-        space, change = self.entered(base.symbol, base, owner.span)
+            raise self.fail("E102", f"'{self._excerpt(e)}' is no port of a component", e.span, help="LABEL.PORT")
+        space, change = self.space_of(base.symbol, base, owner.span)
         name, port = ".".join(names), space.scope.symbols.get(names[0])
         for member in names[1:]:
             port = port.members.get(member) if isinstance(port, BundleNode) else None
+        # several nodes at once
         if isinstance(port, BundleNode):
-            each = ", ".join(f"{self._shown(e)}.{m}" for m in port.members)
-            raise self.fail("E102", f"'{self._shown(e)}' is a bundle of ports", e.span, help=f"one of {each}")
+            each = ", ".join(f"{self._excerpt(e)}.{m}" for m in port.members)
+            raise self.fail("E102", f"'{self._excerpt(e)}' is a bundle of ports", e.span, help=f"one of {each}")
+        # an array of ports by its index, or a single one
         array, end = _array_of(space, name), None
         if array is not None:
             own = (*array.family.prefix, *self.indices(name, array.family.shape, indices, e.span))
@@ -94,7 +97,8 @@ class Ports(Quantities):
         elif isinstance(port, PortSymbol) and inner is e:
             end = port.end
         if end is None:
-            raise self.fail("E407", f"'{self._shown(owner)}' has no port '{name}'", e.span)
+            raise self.fail("E407", f"'{self._excerpt(owner)}' has no port '{name}'", e.span)
+        # two ports at one node: how the flow divides is not known
         others = [p.name for p in _ports(space.scope.symbols.values()) if p is not port and _meet(p.end, end)]
         arrays = ((n, _array_of(space, n)) for n in space.scope.symbols if n != name)
         others += [n for n, a in arrays if a and end.node and a.family.name == end.node.family.name]
@@ -103,10 +107,10 @@ class Ports(Quantities):
             raise self.fail("N608", message, e.span, help="a node for each")
         place, at = self.place(e.span), ", ".join(str(a) for a in (*change.values(), *(end.at if array else ())))
 
-        def taken(*, rates: bool) -> Node:
+        def effort_inside(*, rates: bool) -> Node:
             return ex.substitute(self.taken(space, end, place, rates=rates), change)
 
-        return _Port(f"{space.path}.{name}[{at}]" if at else f"{space.path}.{name}", end, change, taken)
+        return _Port(f"{space.path}.{name}[{at}]" if at else f"{space.path}.{name}", end, change, effort_inside)
 
     def through(self, port: syntax.Expr) -> Typed:
         """The energy that has gone into a component through one of its ports."""

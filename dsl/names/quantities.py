@@ -38,7 +38,7 @@ def branch_words(domain: Domain) -> tuple[str, ...]:
 class Quantities(Paths):
     """What the members of nodes and branches are."""
 
-    def _shown(self, e: syntax.Expr) -> str:
+    def _excerpt(self, e: syntax.Expr) -> str:
         return " ".join(self.source.text[e.span.start : e.span.end].split())[:60]
 
     def no_member(self, owner: str, e: syntax.Member, members: Iterable[str]) -> Failed:
@@ -60,11 +60,13 @@ class Quantities(Paths):
     def node_quantity(self, end: End, e: syntax.Member) -> Typed:
         """Member e of a common-effort node, q and f of a common-flow node."""
         domain = end.domain
+        # a node that is a coordinate has its quantities
         if end.node is not None and end.node.coordinate is not None:
             return self.coordinate_quantity(end.node.coordinate, end.at, e)
+        # an electrical node has a potential, and no flow of its own
         if domain.common == "effort":
             if e.name != "e":
-                shown = self._shown(e.base)
+                shown = self._excerpt(e.base)
                 if habits.variable(domain.name, e.name) == "e":
                     help_ = f"write {shown}.e"
                 elif e.name in MEMBERS:
@@ -75,19 +77,22 @@ class Quantities(Paths):
             if end.node is None:
                 return Typed(ex.const(0.0), domain.effort.dimension)
             return Typed(ex.var(end.node.family.name, "ne", *end.at), domain.effort.dimension)
+        # a mechanical node has q, f, p, and e = p'
         kinds = {"q": ("nq", domain.displacement.dimension), "f": ("nf", domain.flow.dimension)}
         kinds["p"] = ("np", domain.momentum.dimension)
         kinds["e"] = ("np", domain.effort.dimension)  # p' = e
+        # sums of efforts by their kind
         if e.name in EFFORT_CLASSES:
+            # ground: all its quantities are zero
             if end.node is None:
-                raise self.fail("E102", f"'{self._shown(e.base)}' stands still: no effort moves it", e.span)
+                raise self.fail("E102", f"'{self._excerpt(e.base)}' stands still: no effort moves it", e.span)
             return self._effort(end.node.family.name, "n", end.at, domain.effort.dimension, e)
         meant = habits.variable(domain.name, e.name)
         if e.name not in kinds and meant is not None:
-            shown = self._shown(e.base)
+            shown = self._excerpt(e.base)
             raise self.fail("E102", f"'{shown}' has no member '{e.name}'", e.span, help=f"write {shown}.{meant}")
         if e.name not in kinds:
-            raise self.no_member(self._shown(e.base), e, (*kinds, *EFFORT_CLASSES))
+            raise self.no_member(self._excerpt(e.base), e, (*kinds, *EFFORT_CLASSES))
         kind, dimension = kinds[e.name]
         if end.node is None:
             return Typed(ex.const(0.0), dimension)
@@ -110,7 +115,7 @@ class Quantities(Paths):
         if e.name in EFFORT_CLASSES and not co:
             return self._effort(family, "x", at, units["e"].dimension, e)
         if e.name not in kinds:
-            raise self.no_member(self._shown(e.base), e, ("q", "f", "p", "e", *(() if co else EFFORT_CLASSES)))
+            raise self.no_member(self._excerpt(e.base), e, ("q", "f", "p", "e", *(() if co else EFFORT_CLASSES)))
         kind, dimension = kinds[e.name]
         return Typed(ex.var(family, kind, *at), dimension)
 
@@ -119,17 +124,21 @@ class Quantities(Paths):
         family, domain = symbol.family, symbol.domain
         at = (*family.prefix, *at)
         meant = habits.variable(domain.name, name)
+        # `R1.i`: written with the letter of the language
         if meant is not None and (name not in BRANCH or not self._is_store(symbol, name)):
-            shown = self._shown(e.base)
+            shown = self._excerpt(e.base)
             raise self.fail("E102", f"'{shown}' has no member '{name}'", e.span, help=f"write {shown}.{meant}")
         if name not in BRANCH:
-            raise self.no_member(self._shown(e.base), e, BRANCH if nearest(name, BRANCH) else branch_words(domain))
+            raise self.no_member(self._excerpt(e.base), e, BRANCH if nearest(name, BRANCH) else branch_words(domain))
         power = multiply(domain.effort.dimension, domain.flow.dimension)
+        # e f
         if name == "power":
             return Typed(ex.mul(ex.var(family.name, "be", *at), ex.var(family.name, "bf", *at)), power)
+        # what was absorbed since the start
         if name == "energy":
-            return Typed(self._absorbed(symbol, at, power, e), multiply(power, dim.TIME))
-        if name == "p" and self.complete and self._summed(symbol):
+            return Typed(self._absorbed_energy(symbol, at, power, e), multiply(power, dim.TIME))
+        # an element without momentum: the integral of its effort
+        if name == "p" and self.complete and self._has_no_momentum(symbol):
             return Typed(self._impulse(symbol, at, e), branch_dimension(domain, "p"))
         if name in MEMBERS:
             return self._state_function(symbol, at, name, power, e)
@@ -140,7 +149,7 @@ class Quantities(Paths):
         law = self.laws.get(symbol.family.name)
         return name in MEMBERS and law is not None and law.kind == MEMBERS[name].edge
 
-    def _summed(self, symbol: BranchSymbol) -> bool:
+    def _has_no_momentum(self, symbol: BranchSymbol) -> bool:
         """Whether a branch has no momentum of its own: all but kinetic stores and laws that read it."""
         law, name = self.laws.get(symbol.family.name), symbol.family.name
         own = () if law is None else (n for n in ex.variables(law.law) if n.op == "var" and n.data[:2] == (name, "bp"))
@@ -153,20 +162,20 @@ class Quantities(Paths):
         node, unit = ex.var(family.name, "be", *counters), symbol.domain.effort.dimension
         return self.quadrature(f"{family.name}.p", node, family.whole, unit, at, e)
 
-    def _absorbed(self, symbol: BranchSymbol, at: tuple[Node, ...], power: Dimension, e: syntax.Member) -> Node:
+    def _absorbed_energy(self, symbol: BranchSymbol, at: tuple[Node, ...], power: Dimension, e: syntax.Member) -> Node:
         """The energy that a branch has absorbed since the start: what it stores more than then, where its law tells
         that alone; else a quadrature.
         """
         family = symbol.family
         counters = tuple(ex.index(f"#e{k}") for k in range(len(family.whole)))
-        if (stored := self._stored(family.name)) is not None:
+        if (stored := self._kind_of_store(family.name)) is not None:
             first = ex.var(family.name, stored, *counters)
             begun = self.quadrature(f"{family.name}.begun", ex.const(0.0), family.whole, power, at, e, first)
             return ex.sub(ex.var(family.name, stored, *at), begun)
         node = ex.mul(ex.var(family.name, "be", *counters), ex.var(family.name, "bf", *counters))
         return self.quadrature(f"{family.name}.energy", node, family.whole, power, at, e)
 
-    def _stored(self, family: str) -> str | None:
+    def _kind_of_store(self, family: str) -> str | None:
         """The kind of what a store holds, T or V, where its law reads nothing but its own variables: what it absorbs is
         then the difference; else None.
         """
@@ -212,7 +221,7 @@ class Quantities(Paths):
         if law is None or law.kind != function.edge:
             what = "a dissipator" if function.edge == "dissipator" else f"a {function.edge} store"
             own = [m for m, f in MEMBERS.items() if law is not None and f.edge == law.kind]
-            shown = self._shown(e.base)
+            shown = self._excerpt(e.base)
             help_ = " or ".join(f"{shown}.{member}" for member in (*own, "power", "energy"))
             raise self.fail("E102", f"'{shown}' has no member '{name}': it is not {what}", e.span, help=help_)
         dimension = power if function.edge == "dissipator" else multiply(power, dim.TIME)

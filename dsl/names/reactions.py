@@ -8,7 +8,7 @@ from sysdyn.dsl.model import expression as ex
 from sysdyn.dsl.model.calculus import derivative
 from sysdyn.dsl.model.expression import Node
 from sysdyn.dsl.model.network import Branch, Domain
-from sysdyn.dsl.model.rewriting import summed
+from sysdyn.dsl.model.rewriting import sum_over_loops
 
 
 def ledger(domain: Domain, branches: Iterable[Branch]) -> tuple[Node, Node]:
@@ -28,7 +28,7 @@ def ledger(domain: Domain, branches: Iterable[Branch]) -> tuple[Node, Node]:
             continue
         stores = b.kind == kind
         node = ex.scale(float(sign if stores else -sign), ex.var(b.name, content if stores else through, *b.at))
-        (held if stores else supplied).append(summed(node, b.loops))
+        (held if stores else supplied).append(sum_over_loops(node, b.loops))
     return ex.add(*held), ex.add(*supplied)
 
 

@@ -381,11 +381,11 @@ def nearest(name: str, names: Iterable[str]) -> str | None:
         from difflib import get_close_matches  # of mistakes alone
 
         alike = get_close_matches(name[:80], among, 1, 0.6)
-        if alike and (numbered := _unnumbered(name)) != name:
-            alike = [n for n in among if n != name and _unnumbered(n) == numbered] or alike
+        if alike and (numbered := _mask_digits(name)) != name:
+            alike = [n for n in among if n != name and _mask_digits(n) == numbered] or alike
     return alike[0] if alike else None
 
 
-def _unnumbered(name: str) -> str:
+def _mask_digits(name: str) -> str:
     """A name with one sign for each number in it: C1 is nearer to C2 than C is."""
     return re.sub(r"[0-9]+", "#", name)

@@ -6,8 +6,8 @@ import re
 from collections.abc import Container
 from fractions import Fraction
 
-from sysdyn.dsl.model.unit_habits import PREFIXED, cased, declaration, respelled, scaled
-from sysdyn.dsl.model.units import DEGREE_CELSIUS, NONE, PREFIXES, Dimension, Unit, known, multiply, names, si_text
+from sysdyn.dsl.model.unit_habits import PREFIXED, case_variants, correct_spelling, declaration, expand_suffix
+from sysdyn.dsl.model.units import DEGREE_CELSIUS, NONE, PREFIXES, Dimension, Unit, find_unit, multiply, names, si_text
 from sysdyn.dsl.names.symbols import Scope, nearest
 from sysdyn.dsl.text.diagnostics import Edit, Place, Report, SourceText
 from sysdyn.dsl.tree import syntax
@@ -30,15 +30,18 @@ def read_unit(
 
 
 def _read(unit: syntax.Unit, scope: Scope, source: SourceText, report: Report, bound: Container[str]) -> Unit | None:
+    """The unit that a text means, its factors looked up; None after reporting a factor that is no unit (E201)."""
     dimension: Dimension = NONE
     scale = Fraction(1)
     for factor in unit.factors:
         if factor.name == "1":
             continue
+        # with an offset, by itself alone
         if factor.name == "degC" and len(unit.factors) == 1 and factor.exponent == 1:
             return DEGREE_CELSIUS
+        # units of the text before those of the SI
         declared = scope.unit(factor.name)
-        found = (declared.dimension, declared.scale) if declared else known(factor.name)
+        found = (declared.dimension, declared.scale) if declared else find_unit(factor.name)
         if found is None and scope.is_broken(factor.name):
             return None
         if found is None:
@@ -46,10 +49,11 @@ def _read(unit: syntax.Unit, scope: Scope, source: SourceText, report: Report, b
                 scope.miss()  # grown to its number, as in 10k: that has been said (E114)
                 return None
             in_sight = factor.name in bound or scope.find(factor.name) is not None
-            _unknown(unit, factor, in_sight, Place(source, factor.span), report)
+            _report_factor(unit, factor, in_sight, Place(source, factor.span), report)
             return None
         power = factor.exponent if factor.op == "." else -factor.exponent
         dimension = multiply(dimension, found[0], power)
+        # m^1000
         if not -100 <= power <= 100:
             report.error(
                 "E201", f"the exponent {factor.exponent} of a unit is out of reason", Place(source, factor.span)
@@ -61,8 +65,9 @@ def _read(unit: syntax.Unit, scope: Scope, source: SourceText, report: Report, b
     return Unit(dimension, scale, si_text(dimension) if solved else unit.text)
 
 
-def _unknown(unit: syntax.Unit, factor: syntax.UnitFactor, in_sight: bool, place: Place, report: Report) -> None:
+def _report_factor(unit: syntax.Unit, factor: syntax.UnitFactor, in_sight: bool, place: Place, report: Report) -> None:
     """Report a factor of a unit that nobody declared, with what is near."""
+    # `$u` outside of a component
     if factor.name.startswith("$"):
         report.error(
             "E209",
@@ -78,21 +83,25 @@ def _unknown(unit: syntax.Unit, factor: syntax.UnitFactor, in_sight: bool, place
     help_: str | None
     edit = None
     alone = number is not None and len(unit.factors) == 1 and factor.exponent == 1
-    plain = scaled("1" + factor.name) if alone and factor.name.isalpha() else None
+    plain = expand_suffix("1" + factor.name) if alone and factor.name.isalpha() else None
     before = unit.text[: factor.span.start - unit.span.start].rstrip("./")
+    # `4 N/V` with a variable V: a quotient was meant
     if in_sight and before:
         sign = "/" if factor.op == "/" else "*"
         verb = "divide" if factor.op == "/" else "multiply"
         before = quantity.removesuffix(unit.text) + before
         help_ = f"to {verb} by the variable {factor.name} write '{before} {sign} {factor.name}'"
+    # `2 x`: a product
     elif number is not None and alone and (in_sight or factor.name == "pi"):
         help_ = f"factors are joined by '*': {number.group().strip()}*{factor.name}"
+    # `10 k`: a suffix of circuit simulators
     elif number is not None and plain is not None:
         example = PREFIXED.get(plain[1:], "kohm")
         help_ = f"{number.group().strip()}{plain[1:]}, or with its unit, as in '1 {example}'"
     else:
         help_ = _meant(unit, factor)
-        right = respelled(unit.text)
+        # a spelling that is certain can be mended
+        right = correct_spelling(unit.text)
         if right is not None:
             edit = Edit(Place(place.source, unit.span), right)
     report.error("E201", message, place, help=help_, edit=edit)
@@ -103,20 +112,21 @@ _SPELLED = dict.fromkeys(("celsius", "Celsius", "centigrade"), "degC")
 
 def _meant(unit: syntax.Unit, factor: syntax.UnitFactor) -> str | None:
     """The unit as it is written here: by rewriting; else the line that would declare it, else the nearest name."""
-    right = _SPELLED.get(unit.text) or respelled(unit.text)
+    # from certain to vague: another spelling, upper and lower case, a declaration, a near name
+    right = _SPELLED.get(unit.text) or correct_spelling(unit.text)
     if right is not None:
         return f"write '{right}'"
-    alone = respelled(factor.name)
+    alone = correct_spelling(factor.name)
     if alone is not None:
         return f"write '{alone}' for '{factor.name}'"
-    several = cased(factor.name)
+    several = case_variants(factor.name)
     if several:
         return f"write {' or '.join(repr(unit) for unit in several)}"
     line = declaration(factor.name)
     if line is not None:
         return f"declare it at the top of the file: {line}"
     prefix, base = factor.name[:1], factor.name[1:]
-    if prefix in PREFIXES and known(base) is not None:
+    if prefix in PREFIXES and find_unit(base) is not None:
         return f"{base} takes no prefix: 1e{PREFIXES[prefix]} {base}"
     near = nearest(factor.name, (*names(), "mm", "km", "kN", "kohm", "mA", "uF", "degC"))
     return f"nearest unit: '{near}'" if near and len(factor.name) > 1 else "sysdyn help units lists them"

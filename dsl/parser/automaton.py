@@ -169,12 +169,14 @@ class Automaton:
     def _value(self, kind: str) -> Any:
         """What a terminal is worth: a word, a number, a text, or its own sign."""
         scanner = self.scanner
+        # a sign or a word of the language
         if kind[0] != "<" or len(kind) < 3:
             return kind
         start, end = scanner.start, scanner.end
         text = scanner.text[start:end]
         if kind in ("<name>", "<function>", "<index>"):
             return Word(text, Span(start, end))
+        # number and unit
         if kind == "<quantity>" and scanner.unit is not None:
             unit = Span(*scanner.unit)
             number = scanner.text[start : scanner.behind if scanner.behind > start else unit.start].rstrip()
@@ -191,12 +193,15 @@ class Automaton:
     def _reduce(self, left: str, length: int, build: Build | None, children: tuple[tuple[int, bool], ...]) -> None:
         """Replace the topmost `length` entries by what the rule makes of them."""
         states, values, starts, ends, depths = self.states, self.values, self.starts, self.ends, self.depths
+        # what the rule takes from the stack, without absent parts, lists spliced in
         if length:
             base = len(values) - length
             span = Span(starts[base], ends[-1])
+            # a chain of more parts than anyone writes
             if build is None and children[0] == (0, True):
                 parts = values[base]
                 rest = children[1:]
+            # an empty rule: a body without statements
             else:
                 parts = []
                 rest = children
@@ -214,6 +219,7 @@ class Automaton:
             span = Span(ends[-1], ends[-1])
             parts = [None] * len(children)
         value = parts if build is None else build(parts, span, self.notes)
+        # a block with a statement that could not be read
         if span.start in self.damaged and left in _BLOCKS_OF_STATEMENTS:
             value = self.broken(span)
         self.push(left, value, span)

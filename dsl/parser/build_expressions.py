@@ -83,19 +83,19 @@ def reduction(v: Values, span: Span, notes: Notes) -> s.Reduction | s.Call:
             "sum, prod, min or max(i in 1..n: ...)",
         )
         operation = s.Word("sum", operation.span)  # as one of them it is read on
-    notes.declared(index)
+    notes.check_declared(index)
     return s.Reduction(operation.name, index, bounds.lower, bounds.upper, body, span)
 
 
 def arith(v: Values, span: Span, notes: Notes) -> s.Sum:
     """`term ((PLUS | MINUS) term)*`."""
-    notes.counted(v[::2], span)
+    notes.check_count(v[::2], span)
     return s.Sum((("+", v[0]), *zip(v[1::2], v[2::2], strict=True)), span)
 
 
 def term(v: Values, span: Span, notes: Notes) -> s.Product:
     """`unary ((TIMES | SLASH) unary)*`."""
-    notes.counted(v[::2], span, "factors")
+    notes.check_count(v[::2], span, "factors")
     return s.Product((("*", v[0]), *zip(v[1::2], v[2::2], strict=True)), span)
 
 
@@ -116,13 +116,13 @@ def compare(v: Values, span: Span, notes: Notes) -> s.Compare:
 
 def or_(v: Values, span: Span, notes: Notes) -> s.Or:
     """`and_ (or and_)*`."""
-    notes.counted(v, span)
+    notes.check_count(v, span)
     return s.Or(tuple(v), span)
 
 
 def and_(v: Values, span: Span, notes: Notes) -> s.And:
     """`not_ (and not_)*`."""
-    notes.counted(v, span)
+    notes.check_count(v, span)
     return s.And(tuple(v), span)
 
 
@@ -154,7 +154,7 @@ def group(v: Values, span: Span, notes: Notes) -> s.Group:
 def array(v: Values, span: Span, notes: Notes) -> s.Array:
     """`[ [expr (, expr)*] ]`."""
     items = tuple(item for item in v if item is not None)
-    notes.counted(items, span, "items")
+    notes.check_count(items, span, "items")
     return s.Array(items, span)
 
 

@@ -40,7 +40,7 @@ def import_(v: Values, span: Span, notes: Notes) -> s.Import:
 
 def domain(v: Values, span: Span, notes: Notes) -> s.Domain:
     """`domain NAME { _body{role} }`."""
-    notes.declared(v[0])
+    notes.check_declared(v[0])
     return s.Domain(v[0], tuple(v[1:]), span, notes.doc(span))
 
 
@@ -69,7 +69,7 @@ def domain_pseudo(v: Values, span: Span, notes: Notes) -> s.DomainPseudo:
 
 def bundle(v: Values, span: Span, notes: Notes) -> s.Bundle:
     """`bundle NAME { _body{bundle_member} }`."""
-    notes.declared(v[0])
+    notes.check_declared(v[0])
     return s.Bundle(v[0], tuple(v[1:]), span, notes.doc(span))
 
 
@@ -90,13 +90,13 @@ def unit_base(v: Values, span: Span, notes: Notes) -> s.UnitBase:
 
 def const(v: Values, span: Span, notes: Notes) -> s.Const:
     """`const NAME = expr`."""
-    notes.declared(v[0])
+    notes.check_declared(v[0])
     return s.Const(v[0], v[1], span, notes.doc(span))
 
 
 def function(v: Values, span: Span, notes: Notes) -> s.Function:
     """`fn NAME ( [parameters] ) -> unit = expr`."""
-    notes.declared(v[0])
+    notes.check_declared(v[0])
     return s.Function(v[0], v[1] or (), v[2], v[3], span, notes.doc(span))
 
 
@@ -107,13 +107,13 @@ def parameter(v: Values, span: Span, notes: Notes) -> s.Parameter:
 
 def table(v: Values, span: Span, notes: Notes) -> s.Table:
     """`table NAME ( parameters ) -> unit INTERPOLATION [EXTRAPOLATION] rows`."""
-    notes.declared(v[0])
+    notes.check_declared(v[0])
     return s.Table(v[0], v[1], v[2], v[3], v[4], v[5], None, span, notes.doc(span))
 
 
 def table_file(v: Values, span: Span, notes: Notes) -> s.Table:
     """`table NAME ( parameters ) -> unit INTERPOLATION [EXTRAPOLATION] file STRING`."""
-    notes.declared(v[0])
+    notes.check_declared(v[0])
     return s.Table(v[0], v[1], v[2], v[3], v[4], None, v[5].value, span, notes.doc(span))
 
 
@@ -124,13 +124,13 @@ def row(v: Values, span: Span, notes: Notes) -> s.Row:
 
 def component(v: Values, span: Span, notes: Notes) -> s.Component:
     """`component NAME block`."""
-    notes.declared(v[0])
+    notes.check_declared(v[0])
     return s.Component(v[0], v[1], span, notes.doc(span))
 
 
 def model(v: Values, span: Span, notes: Notes) -> s.Model:
     """`model NAME block`."""
-    notes.declared(v[0])
+    notes.check_declared(v[0])
     return s.Model(v[0], v[1], span, notes.doc(span))
 
 
@@ -144,68 +144,68 @@ def scene(v: Values, span: Span, notes: Notes) -> s.Scene:
 
 def param(v: Values, span: Span, notes: Notes) -> s.Param:
     """`param decl [: unit] [= expr]`."""
-    notes.declared(v[0])
+    notes.check_declared(v[0])
     return s.Param(v[0], v[1], v[2], span, notes.doc(span))
 
 
 def node(v: Values, span: Span, notes: Notes) -> s.Node:
     """`node decls : domain_name [initial]`."""
-    notes.declared(*v[0])
+    notes.check_declared(*v[0])
     return s.Node(v[0], v[1], v[2], span, notes.doc(span))
 
 
 def port(v: Values, span: Span, notes: Notes) -> s.Port:
     """`port decls : domain_name`."""
-    notes.declared(*v[0])
+    notes.check_declared(*v[0])
     return s.Port(v[0], v[1], span, notes.doc(span))
 
 
 def branch(v: Values, span: Span, notes: Notes) -> s.Branch:
     """`branch [decls] : domain_name`."""
-    notes.declared(*(v[0] or ()))
+    notes.check_declared(*(v[0] or ()))
     return s.Branch(v[0] or (), v[1], span, notes.doc(span))
 
 
 def input_(v: Values, span: Span, notes: Notes) -> s.Input:
     """`input decl : unit [= expr]`."""
-    notes.declared(v[0])
+    notes.check_declared(v[0])
     return s.Input(v[0], v[1], v[2], span, notes.doc(span))
 
 
 def output(v: Values, span: Span, notes: Notes) -> s.Output:
     """`output decl = expr`."""
-    notes.declared(v[0])
+    notes.check_declared(v[0])
     return s.Output(v[0], v[1], span, notes.doc(span))
 
 
 def quasi(v: Values, span: Span, notes: Notes) -> s.Quasi:
     """`quasi decl : unit = expr`."""
-    notes.declared(v[0])
+    notes.check_declared(v[0])
     return s.Quasi(v[0], v[1], v[2], span, notes.doc(span))
 
 
 def coord(v: Values, span: Span, notes: Notes) -> s.Coord:
     """`COORD decls : domain_name [TANGIBLE] [initial]`."""
-    notes.declared(*v[1])
+    notes.check_declared(*v[1])
     tangible = None if v[3] is None else v[3] == "tangible"
     return s.Coord(v[0], v[1], v[2], tangible, v[4], span, notes.doc(span))
 
 
 def implicit(v: Values, span: Span, notes: Notes) -> s.Implicit:
     """`implicit decls : unit [initial]`."""
-    notes.declared(*v[0])
+    notes.check_declared(*v[0])
     return s.Implicit(v[0], v[1], v[2], span, notes.doc(span))
 
 
 def state(v: Values, span: Span, notes: Notes) -> s.State:
     """`state decl [: unit] [= expr]`."""
-    notes.declared(v[0])
+    notes.check_declared(v[0])
     return s.State(v[0], v[1], v[2], span, notes.doc(span))
 
 
 def discrete(v: Values, span: Span, notes: Notes) -> s.Discrete:
     """`discrete decl [: unit] = expr`."""
-    notes.declared(v[0])
+    notes.check_declared(v[0])
     return s.Discrete(v[0], v[1], v[2], span, notes.doc(span))
 
 
@@ -216,7 +216,7 @@ def dynamic(v: Values, span: Span, notes: Notes) -> s.Dynamic:
 
 def let(v: Values, span: Span, notes: Notes) -> s.Let:
     """`let decl = expr`."""
-    notes.declared(v[0])
+    notes.check_declared(v[0])
     return s.Let(v[0], v[1], span, notes.doc(span))
 
 
@@ -255,7 +255,7 @@ def work(v: Values, span: Span, notes: Notes) -> s.Work:
 
 def constraint(v: Values, span: Span, notes: Notes) -> s.Constraint:
     """`CONSTRAINT decl : arith relation arith guards`."""
-    notes.declared(v[1])
+    notes.check_declared(v[1])
     return s.Constraint(v[0], v[1], v[2], v[3], v[4], v[5], span, notes.doc(span))
 
 
@@ -301,7 +301,7 @@ def action(v: Values, span: Span, notes: Notes) -> s.Action:
 
 def for_(v: Values, span: Span, notes: Notes) -> s.For:
     """`for NAME in range block`."""
-    notes.declared(v[0])
+    notes.check_declared(v[0])
     return s.For(v[0], v[1].lower, v[1].upper, v[2], span, notes.doc(span))
 
 
@@ -345,7 +345,7 @@ def instance(v: Values, span: Span, notes: Notes) -> s.Instance:
     """`decl : dotted [args] [connections]`."""
     if v[0].name != "t":
         # the library has elements 't': a label is only read with a dot behind it, time never is
-        notes.declared(v[0])
+        notes.check_declared(v[0])
     return s.Instance(v[0], v[1], v[2], v[3] or (), span, notes.doc(span))
 
 

@@ -115,7 +115,7 @@ Complaint = tuple[str, str, str | None]
 """Code, message, help."""
 
 
-def quoted(text: str, kind: str = "") -> str:
+def quote_token(text: str, kind: str = "") -> str:
     """What was found, for a message."""
     if kind == "<end>":
         return "the end of the file"
@@ -146,7 +146,7 @@ def first_token(text: str, kind: str, body: str) -> Complaint:
         return "E113", "';' ends nothing here", None
     if text == "{":
         return "E109", "a statement cannot begin with '{'", "the '{' at the end of the line above"
-    return "E109", f"a statement cannot begin with {quoted(text, kind)}", _CONTINUE
+    return "E109", f"a statement cannot begin with {quote_token(text, kind)}", _CONTINUE
 
 
 def connection() -> Complaint:
@@ -162,9 +162,10 @@ def conditional(after: str) -> Complaint:
     return "E110", message, "(if ... then ... else ...)"
 
 
-def unknown(word: str, after: str, body: str, text: str = "") -> Complaint:
+def unknown_statement(word: str, after: str, body: str, text: str = "") -> Complaint:
     """A statement whose first word begins no statement of this body; `after` is what stands behind it in the text."""
     here = _HERE[body]
+    # a statement of another place: `trace x` in a model
     if word not in _OWN[body]:
         for words, place in (
             (SCENE_WORDS, "in a scene"),
@@ -185,10 +186,13 @@ def unknown(word: str, after: str, body: str, text: str = "") -> Complaint:
         return "E113", "an action assigns: name := expression", None
     if body == "bundle_member":
         return "E113", "a bundle lists nodes: x, y: translation", None
+    # `resistor(R = 1 ohm) a -> b` without a label
     if body == "statement" and (element := _element(word, after.partition("\n")[0], text)) is not None:
         return "E113", f"no statement begins with '{word}'; an element has a label", element
+    # L = T - V as one function
     if word in ("L", "Lagrangian") and body == "statement" and re.match(r"=[^\n]*'", after) is not None:
         return "E113", f"no statement begins with '{word}'; a Lagrangian is written by its parts", MOTION
+    # `k = 3 N/m` without its word
     if after.startswith("=") and not after.startswith("=="):
         wanted = "set" if body == "scene_statement" else "const" if body == "item" else "let"
         wanted = "law" if body == "statement" and word in ("e", "f", "q", "p") else wanted
@@ -197,24 +201,30 @@ def unknown(word: str, after: str, body: str, text: str = "") -> Complaint:
             f"no statement begins with '{word}'; a value is given by a word before it",
             f"{wanted} {word} = ...",
         )
+    # `spring.k = 3 N/m`
     if body != "item" and (member := re.match(r"(?:\.\w+)+'?(?=\s*=(?!=))", after)) is not None:
         path = f"{word}{member[0]}"
         given = f", set {path} = ... of a parameter" if body == "scene_statement" else ""
         return "E113", f"no statement begins with '{path}'", f"init {path} = ... where it begins{given}"
+    # `x' = 3`
     if after.startswith("'"):
         help_ = f"init {word}' = ... where it begins, dynamic {word}' = ... of a state"
         help_ = f"names of a trace are joined by commas: trace x, {word}'" if body == "scene_statement" else help_
         help_ = MOTION if after.startswith("''") else help_
         return "E113", f"no statement begins with '{word}''", help_
+    # `m*x'' = -k*x`
     if "''" in after.partition("=")[0] and "=" in after:
         return "E113", f"no statement begins with '{word}'; equations of motion are not written", MOTION
+    # `x^2 + y^2 = l^2` without phi
     if after[:1] in "^*/+-" and after and "=" in after.partition("\n")[0]:
         return "E113", f"no statement begins with '{word}'; a constraint has a label", f"phi name: {word} ... = ..."
     from difflib import get_close_matches
 
+    # `translation x = 1 m`, in the order of declarations in C
     named = re.match(r"(\w+)\s*([=~].*)", after.partition("#")[0])
     if body == "statement" and named is not None and word in ("translation", "rotation"):
         return "E113", f"no statement begins with '{word}'", f"coord {named[1]}: {word} {named[2].strip()}"
+    # a word that differs by little, or one of other languages
     near = get_close_matches(word, sorted(_OWN[body] | MODEL_WORDS | SCENE_WORDS | ITEM_WORDS), 1, 0.7)
     said = OTHERS.get(word.lower(), "").replace("DOMAIN", word.lower())
     if after.startswith("(") and body == "statement" and not said and (not near or near[0] not in MODEL_WORDS):
@@ -241,34 +251,42 @@ def _is_component(name: str, text: str) -> bool:
     return re.search(rf"\bimport\b[\w\s,]*?\b{name}\b|^\s*component\s+{name}\b", text, re.MULTILINE) is not None
 
 
-def expected(accepted: Collection[str], kind: str, text: str, line: str, word: str = "") -> Complaint:
+def unexpected_token(accepted: Collection[str], kind: str, text: str, line: str, word: str = "") -> Complaint:
     """A token that does not fit, with what would; `line` is the line up to it, `word` begins the statement."""
-    said = f"expected {_listed(accepted)}, found {quoted(text, kind)}"
+    said = f"expected {_describe_terminals(accepted)}, found {quote_token(text, kind)}"
     shape = SHAPES.get(word)
+    # let x^2 + y^2 = l^2
     if word == "let" and text in ("^", "*", "+", "-", "/") and "=" not in line:
         return "E113", "a let names one value; a constraint has a label", "phi name: ... = ... of displacements"
+    # param a = 1, b = 2
     if text == "," and word in ("param", "state", "let", "input", "output", "const", "discrete"):
         shape = f"one name a statement: {SHAPES.get(word, word + ' on = false')}"
+    # work 2 x on q
     if kind == "<name>" and "*" in accepted and (word in _EXPRESSIONS or ")" in accepted):
         shape = f"factors are joined by '*': ... * {text}"
+    # sum(x[i] for i in 1..n)
     reduced = re.search(r"\b(sum|prod|max|min)\((?:[^()]|\([^()]*\))*$", line)
     if text == "for" and reduced is not None:
         return "E113", said, f"the index stands first: {reduced[1]}(i in 1..n: ...)"
+    # 3 sin(x): read as a unit
     unit = re.search(r"([\d.]+)\s+([^\W\d]\w*)$", line)
     if text == "(" and "*" in accepted and unit is not None:
         called = "(...)" if unit[2] in FUNCTIONS else "*(...)"
         meant = f"factors are joined by '*': {unit[1]}*{unit[2]}{called}"
         return "E113", f"'{unit[2]}' stands where a unit is read", meant
+    # 3 N x[1]
     last = re.search(r"([\d.]+\s+[^\s()]*?)\s*([./]?)([^\W\d]\w*)$", line)
     if text == "[" and word != "param" and "*" in accepted and last is not None:
         meant = f"the variable stands apart: {last[1].strip()} {'/' if last[2] == '/' else '*'} {last[3]}[...]"
         return "E113", f"'{last[3]}' stands where a unit is read", meant
     if word == "work" and line.split()[-1:] == ["on"]:
         shape = SHAPES["work"]
+    # param k: 3 N/m
     if word in ("param", "const", "coord", "state") and re.search(r":\s*[-+]?[\d.]+$", line):
         shape = f"a value stands behind '=': {SHAPES[word]}"
     if word == "param" and text == "[":
         shape = "a unit has no brackets: param k = 3 N/m"
+    # node a b: electrical
     if (
         kind == "<name>"
         and "," in accepted
@@ -277,18 +295,21 @@ def expected(accepted: Collection[str], kind: str, text: str, line: str, word: s
         colon = ":" in accepted and text in _DOMAINS
         joined = f"{' '.join(line.split())}{':' if colon else ','} {text}"
         shape = joined if word != "trace" else f"{joined}; a name of one's own: as {text}"
+    # cell.a[1] = n1
     member = re.search(r"(\w+)(?:\.\w+|\[[^\]]*\])+\s*$", line)
     if text == "=" and "->" in accepted and member is not None:
         return "E113", said, f"a port is given whole, a bundle as one of nodes, an array as an array: {member[1]} = ..."
+    # trace x as pos in mm
     if word == "trace" and text == "in":
         shape = "the unit stands before the name: trace x in mm as pos"
     return "E113", said, _hint(kind, text, line, accepted) or shape
 
 
-def _listed(accepted: Collection[str]) -> str:
+def _describe_terminals(accepted: Collection[str]) -> str:
     """Terminals in the author's terms."""
     rest = set(accepted)
     parts: list[str] = []
+    # groups of terminals by one word, so that the list is short
     if {"(", "<name>", "<number>"} <= rest:
         parts.append("an expression")
         rest -= _ATOMS
@@ -302,6 +323,7 @@ def _listed(accepted: Collection[str]) -> str:
         if words <= rest:
             parts.append(said)
             rest -= words
+    # operators together
     if len(rest & _OPERATORS) > 2:
         parts.append("an operator")
         rest -= _OPERATORS | {"(", "[", "'", "^"}
@@ -311,6 +333,7 @@ def _listed(accepted: Collection[str]) -> str:
     if "<newline>" in rest:
         parts.append(_CLASSES["<newline>"])
         rest -= {"<newline>", "<end>", "}"}
+    # what is left one by one, the first few
     signs = sorted(rest, key=lambda terminal: (terminal.isalpha(), terminal))
     parts.extend(_CLASSES.get(terminal, f"'{terminal}'") for terminal in signs[: max(1, 6 - len(parts))])
     if not parts:
@@ -325,6 +348,7 @@ _OPENS = {")": "(", "]": "["}
 
 def _hint(kind: str, text: str, line: str, accepted: Collection[str]) -> str | None:
     """The text to write for a slip that is easily named."""
+    # each test is one slip, named by the token that does not fit and what stands before it
     before = line[-1:]
     if text in (")", "]") and text not in accepted and line.count(_OPENS[text]) <= line.count(text):
         return f"one '{'(' if text == ')' else '['}' more before it, or delete it"

@@ -46,44 +46,55 @@ class Faults:
         start = self._statement_start()
         word, after = self._first_word(start)
         bracket = self._open_bracket(kind)
+        # `n := 3` outside of when and every
         if kind == ":=" and _TARGET.fullmatch(scanner.text, start, scanner.start):
             meant = scanner.text[start : scanner.line_end()].partition(";")[0].rstrip(" \t}")
             said = "':=' assigns at an event, and this stands in none"
             self._error(("E113", said, f"when CONDITION {{ {meant} }}, or every 10 ms {{ {meant} }}"), self._token())
+        # "text without an end
         elif kind == "<fault>" and scanner.fault == "text":
             self._error(("E112", "the text that begins with this '\"' is not closed on its line", '"'), self._token())
+        # a row of one number
         elif word == "table" and text == ")" and automaton.accepts(","):
             row = "a row of a table holds its arguments and the value: one number is no row"
             self._error(("E113", row, "(0, 0), (1, 2)"), self._token())
+        # a bracket that is open since the lines above
         elif bracket is not None:
             self._not_closed(bracket)
-        elif (slip := foreign.around(scanner.text, scanner.start, scanner.end, kind)) is not None:
+        # habits of other languages: 1,5 and x**2 and 0x10
+        elif (slip := foreign.find_slip(scanner.text, scanner.start, scanner.end, kind)) is not None:
             self._error(slip.complaint, self._token(), slip.meant, slip.span)
         elif kind == "<fault>":
             self._error(self._character(text, body, start), self._token())
+        # an operator at the end of the line, and what follows begins a statement
         elif scanner.suspect is not None:
             sign = scanner.text[scanner.dangling.start : scanner.dangling.end]
             self._error(("E113", f"the statement ends with '{sign}': something is missing", None), scanner.dangling)
+        # the first token of a statement
         elif size == len(automaton.states) and kind != "<name>" and kind not in RESERVED:
             remark = scanner.text[scanner.start : scanner.start + 2]
             text = remark if remark in ("//", "/*") else text
             self._error(complaints.first_token(text, kind, body), self._token())
         elif kind == "if" and automaton.accepts("("):
             self._error(complaints.conditional(scanner.text[scanner.end :].partition("\n")[0]), self._token())
+        # `level` of a scene in a component
         elif self._other_level(word, kind, body):
             where = "a scene" if body == "statement" else "a component"
             here = "a model" if body == "statement" else "a scene"
             what = "level x = name" if body == "statement" else "level name { }"
             self._error(("E107", f"'{what}' belongs in {where}, not in {here}", None), Span(start, start + 5))
+        # a word that begins no statement here
         elif word and word not in self._words_here(size) and after[:1] not in (":", "["):
-            self._unknown(word, after, body, start)
+            self._report_statement(word, after, body, start)
+        # a word of the language as a label
         elif kind == ":" and after.startswith((":", "[")) and word in self._words_here(size):
             self._no_label(word, after, start)
+        # a token in the middle of a statement: what would have been accepted
         else:
             accepted = [terminal for terminal in automaton.row if automaton.accepts(terminal)]
             before = scanner.text[: scanner.start].rstrip()
             line = before[before.rfind("\n") + 1 :]
-            complaint = complaints.expected(accepted, kind, text, line, word)
+            complaint = complaints.unexpected_token(accepted, kind, text, line, word)
             self.nameless = "has a label" in complaint[1]
             self._error(complaint, self._token())
 
@@ -95,16 +106,16 @@ class Faults:
         number = re.search(r"[0-9.]+$", before)
         return (*complaint[:2], f"{number[0]} percent") if text == "%" and number is not None else complaint
 
-    def _unknown(self, word: str, after: str, body: str, start: int) -> None:
+    def _report_statement(self, word: str, after: str, body: str, start: int) -> None:
         """A word that begins no statement: a slip of one, another language's, or what goes on from the line above."""
         from sysdyn.dsl.parser import foreign
 
-        complaint = complaints.unknown(word, after, body, self.scanner.text)
+        complaint = complaints.unknown_statement(word, after, body, self.scanner.text)
         netlist = foreign.spice(word, after) if body == "statement" and complaint[::2] == ("E113", None) else None
         if netlist is not None:
             complaint = (complaint[0], "an element is written with its label, its parameters named", netlist)
         continues = after[:1] in ("=", ",") or not after.strip()
-        if after.startswith("->") or (complaint[0] == "E113" and continues and self._indented(start)):
+        if after.startswith("->") or (complaint[0] == "E113" and continues and self._is_indented(start)):
             complaint = complaints.connection()
             if self._told_above(start):
                 return
@@ -147,7 +158,7 @@ class Faults:
             and self.scanner.column(start) == self.scanner.column(last.span.start)
         )
 
-    def _indented(self, start: int) -> bool:
+    def _is_indented(self, start: int) -> bool:
         """Whether the statement stands further right than the one before it, those that continue it left out."""
         states, starts = self.automaton.states, self.automaton.starts
         size, _ = self.automaton.body()

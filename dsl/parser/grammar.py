@@ -112,19 +112,23 @@ def build_tables(*, strict: bool = False) -> Tables:
     lookaheads: dict[tuple[str, ...], int] = {}
     states = []
     gotos = []
+    # a row of actions by sets of terminals, a row of gotos by left sides
     for state in order:
         by_action: dict[int, set[str]] = {}
         goto = []
         for symbol, (action, target) in sorted(automaton.states[state].items(), key=_symbol):
+            # negative: the number of a rule
             if action.name == "Reduce":
                 code = -1 - rules.setdefault(target, len(rules))
+            # a terminal: the state behind it
             elif symbol in kinds:
                 code = number[target]
+            # a left side: where to go on after a reduction
             else:
                 goto.append((symbol, number[target]))
                 continue
             by_action.setdefault(code, set()).update(kinds[symbol])
-        states.append(_numbered(by_action, lookaheads))
+        states.append(_number_lookaheads(by_action, lookaheads))
         gotos.append(tuple(sorted(goto)))
     return Tables(
         final=str(number[automaton.end_states["start"]]),
@@ -167,7 +171,9 @@ def _symbol(entry: tuple[str, Any]) -> str:
     return entry[0]
 
 
-def _numbered(by_action: dict[int, set[str]], lookaheads: dict[tuple[str, ...], int]) -> tuple[tuple[int, int], ...]:
+def _number_lookaheads(
+    by_action: dict[int, set[str]], lookaheads: dict[tuple[str, ...], int]
+) -> tuple[tuple[int, int], ...]:
     """Actions of a state with the number of the set of terminals that each is taken on."""
     sets = {action: tuple(sorted(terminals)) for action, terminals in by_action.items()}
     return tuple((action, lookaheads.setdefault(sets[action], len(lookaheads))) for action in sorted(sets))
@@ -181,6 +187,7 @@ def _rule(rule: Any) -> str:
     missing = options.empty_indices or (False,) * len(rule.expansion)
     children: list[str] = []
     position = 0
+    # a `-` for an optional part that is not there
     for absent in missing:
         if absent:
             children.append("-")
@@ -190,6 +197,7 @@ def _rule(rule: Any) -> str:
             spliced = not symbol.is_term and symbol.name.startswith("_")
             children.append(f"{position}{'*' if spliced else ''}")
         position += 1
+    # the function that builds the node; `_body` and its like make lists
     name = rule.alias or rule.origin.name
     if rule.alias is None and rule.origin.name.startswith("_"):
         name = "[]"

@@ -44,8 +44,10 @@ def surplus(text: str, start: int) -> tuple[int, frozenset[str]]:
     depth, unmatched, words = 0, 0, set[str]()
     for mark in _MARKS.finditer(text, start):
         brace, head, word = mark.groups()
+        # the next item begins
         if head and depth == 0 and mark.start() > start:
             break
+        # braces in pairs, and those that close too many
         if brace == "{":
             depth += 1
         elif brace == "}":

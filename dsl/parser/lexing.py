@@ -135,15 +135,18 @@ class Scanner:
 
     def read(self, row: Container[str]) -> str:
         """The next terminal in a state that can take the terminals of `row`."""
+        # a newline that recovery puts in
         if self.pending:
             self.pending = False
             self.start = self.end
             return self._newline()
         text = self.text
         match = _TOKEN.match(text, self.end)
+        # over blanks, remarks, and newlines that end nothing (inside brackets, behind an operator)
         while match is not None:
             group = match.lastindex
             start, end = match.span(group)  # type: ignore[arg-type]
+            # a remark
             if group == 4:
                 self._comment(start, end)
                 self._own_line = False
@@ -164,6 +167,7 @@ class Scanner:
         self._own_line = False
         self.start, self.end = start, end
         word = text[start:end]
+        # a word: a function where one may be called, a word of the language, or a name
         if group == 1:
             if "<function>" in row and (function := _FUNCTION.match(text, start)) is not None:
                 self.end = function.end()
@@ -172,8 +176,10 @@ class Scanner:
                 kind = word
             else:
                 kind = "<name>"
+        # a sign
         elif group == 6:
             kind = word if word not in "()[]{}" else self._bracket(word)
+        # a number, with its unit where a quantity may stand
         elif group == 2:
             kind = self._number(row, end)
         else:

@@ -49,14 +49,14 @@ class Notes:
         """The documentation above the statement of that span."""
         return self.docs.get(span.start)
 
-    def declared(self, *names: Word | Decl) -> None:
+    def check_declared(self, *names: Word | Decl) -> None:
         """Check that names may be declared."""
         for item in names:
             if item.name in PREDEFINED:
                 span = Span(item.span.start, item.span.start + len(item.name))
                 self.error("E108", f"'{item.name}' is predefined and cannot be declared", span)
 
-    def counted(self, items: Sequence[object], span: Span, what: str = "terms") -> None:
+    def check_count(self, items: Sequence[object], span: Span, what: str = "terms") -> None:
         """Check the number of parts of one chain."""
         if len(items) > MAX_TERMS:
             message = f"an expression of {len(items)} {what}; the limit is {MAX_TERMS}"
@@ -78,7 +78,7 @@ class Notes:
             start = span.start + match.start(2)
             place = Span(start, span.start + match.end())
             written = match.group(3) or "1"
-            power = self._grouped(written, place, span) if written[0] == "(" else self.exponent(written, place)
+            power = self._read_exponent(written, place, span) if written[0] == "(" else self.exponent(written, place)
             factors.append(UnitFactor(match.group(2), power, match.group(1) or ".", place))
         return Unit(tuple(factors), text, span)
 
@@ -94,7 +94,7 @@ class Notes:
         exact = Fraction(text).limit_denominator(1000)
         return int(exact) if exact.denominator == 1 else exact
 
-    def _grouped(self, written: str, place: Span, unit: Span) -> int | Fraction:
+    def _read_exponent(self, written: str, place: Span, unit: Span) -> int | Fraction:
         """E115: an exponent in parentheses, which others would read as one of the whole quantity."""
         text, inner = self.source.text[unit.start : unit.end], "".join(written[1:-1].split())
         found = _GROUPED.fullmatch(inner)

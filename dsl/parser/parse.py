@@ -25,31 +25,31 @@ def parse(source: SourceText) -> tuple[File, tuple[Diagnostic, ...]]:
     The codes are E107 to E118, and E308 for a content written as an energy. Never raises; the time
     is proportional to the length of the text.
     """
-    refused = _refused(source)
+    refused = _check_length(source)
     if refused is not None:
         return File(source, (), (), Span(0, len(source.text))), (refused,)
     with at_rest():
         return _parse(source)
 
 
-def expected(source: SourceText) -> frozenset[str]:
+def expected_words(source: SourceText) -> frozenset[str]:
     """The words of the language that may follow a text: what an editor offers behind it."""
-    if _refused(source) is not None:
+    if _check_length(source) is not None:
         return frozenset()
     with at_rest():
-        automaton = _followed(source, len(source.text))
+        automaton = _run_automaton(source, len(source.text))
         return frozenset(word for word in words() if automaton.accepts(word))
 
 
 def _parse(source: SourceText) -> tuple[File, tuple[Diagnostic, ...]]:
     """Run the automaton to the end of the text."""
-    automaton = _followed(source)
+    automaton = _run_automaton(source)
     comments = tuple(automaton.scanner.comments)
     tree = File(source, automaton.values[-1], comments, Span(0, len(source.text)))
     return tree, automaton.notes.report.diagnostics
 
 
-def _followed(source: SourceText, until: int | None = None) -> Automaton:
+def _run_automaton(source: SourceText, until: int | None = None) -> Automaton:
     """The automaton behind a text; until: before what is added at its end to finish statements and blocks."""
     automaton = Automaton(source)
     recovery, patterns = Recovery(automaton), Patterns(automaton)
@@ -58,19 +58,21 @@ def _followed(source: SourceText, until: int | None = None) -> Automaton:
         kind = scanner.read(automaton.row)
         if scanner.start == until:
             break
-        kind = recovery.checked(kind)
+        # slips that are certain are corrected on the way
+        kind = recovery.correct_terminal(kind)
         if not automaton.advance(kind):
             recovery.recover(kind)
         elif automaton.depths[-1] > MAX_NESTING:
             recovery.too_deep()
         elif automaton.overflow:
             recovery.too_long()
+        # lines that are alike are read by a recipe
         else:
             patterns.follow(kind)
     return automaton
 
 
-def _refused(source: SourceText) -> Diagnostic | None:
+def _check_length(source: SourceText) -> Diagnostic | None:
     """E116 where the text is longer than anyone writes."""
     text = source.text
     if len(text) > MAX_BYTES:

@@ -75,7 +75,7 @@ class Patterns:
         scanner = automaton.scanner
         start = scanner.start
         if start == scanner.statement and kind != "<newline>":
-            self._at(start)
+            self._begin_line(start)
         elif self._key is not None:
             unit = scanner.unit if kind == "<quantity>" else None
             begin = self._begin
@@ -84,7 +84,7 @@ class Patterns:
             if start >= self._end:
                 self._learn(kind)
 
-    def _at(self, start: int) -> None:
+    def _begin_line(self, start: int) -> None:
         """A line begins here."""
         automaton = self._automaton
         text = automaton.source.text
@@ -123,6 +123,7 @@ class Patterns:
         text, notes, scanner = automaton.source.text, automaton.notes, automaton.scanner
         slots: list[Any] = [None, automaton.values[-1]]
         add, take, new = slots.append, slots.__getitem__, tuple.__new__
+        # leaves of the tree, at the place of this line
         for kind, a, b, c, d in recipe.leaves:
             a += at
             b += at
@@ -138,10 +139,12 @@ class Patterns:
                 add(Text(text[a + 1 : b - 1], span))
             else:
                 add(Word(text[a:b], span) if kind in ("<function>", "<index>") else kind)
+        # nodes, by the functions of the grammar in the recorded order
         for build, parts, a, b in recipe.rules:
             values = list(map(take, parts))
             add(values if build is None else build(values, new(Span, (at + a, at + b)), notes))
         automaton.cut(len(automaton.states) - 1)
+        # the automaton as it stands behind the line
         for state, value, a, b in recipe.left:
             automaton.states.append(state)
             automaton.values.append([slots[k] for k in value] if isinstance(value, list) else slots[value])
@@ -174,16 +177,19 @@ def _recipe(below: int, first: int, tokens: Sequence[Token]) -> Recipe | None:
         rules.append((None, tuple(value), 0, 0))
         return firsts + len(rules) - 1
 
+    # as the automaton: reduce as long as the token says so, then shift
     for number, token in enumerate(tokens):
         while (action := action_of(stack[-1].state, token.kind)) is not None and action < 0:
             left, length, build, hands_on, children = rule_of(action)
             base = len(stack) - length
+            # reaches below the line: at its newline the recipe is complete
             if base < 0:
                 if token.kind == "<newline>":
-                    return _packed(tokens, rules, stack, closed)
+                    return _pack_recipe(tokens, rules, stack, closed)
                 return None
             start, end = (stack[base].start, stack[-1].end) if length else (stack[-1].end, stack[-1].end)
             value = stack[-1].value
+            # the children of the rule become one node or list
             if not hands_on:
                 parts: list[int] = []
                 for place, spliced in children:
@@ -202,6 +208,7 @@ def _recipe(below: int, first: int, tokens: Sequence[Token]) -> Recipe | None:
             stack.append(_Entry(following, value, start, end))
         if token.kind == "<newline>":
             break
+        # the line does not parse: no recipe
         if action is None:
             return None
         stack.append(_Entry(action, number + 2, token.start, token.end))
@@ -209,22 +216,24 @@ def _recipe(below: int, first: int, tokens: Sequence[Token]) -> Recipe | None:
             opened.append(token)
         elif token.kind in ")]":
             closed = opened[-1].kind, opened.pop().start, token.end
-    return _packed(tokens, rules, stack, closed)
+    return _pack_recipe(tokens, rules, stack, closed)
 
 
-def _packed(
+def _pack_recipe(
     tokens: Sequence[Token],
     rules: Sequence[tuple[Build | None, tuple[int, ...], int, int]],
     stack: Sequence[_Entry],
     closed: tuple[str, int, int] | None,
 ) -> Recipe:
     """The recipe without leaves that nothing asks for."""
+    # leaves and nodes that some rule or the stack reads
     asked = {0, 1, *(k for rule in rules for k in rule[1])}
     for entry in stack:
         asked.update(entry.value if isinstance(entry.value, list) else (entry.value,))
     kept = [k for k in range(len(tokens) + 2) if k in asked]
     kept += range(len(tokens) + 2, len(tokens) + 2 + len(rules))
     place = {k: at for at, k in enumerate(kept)}
+    # numbered anew without the others
     leaves = tuple(
         (token.kind, token.start, token.end, *(token.unit or (0, 0)))
         for number, token in enumerate(tokens)

@@ -49,34 +49,42 @@ class Recovery(Faults):
 
     # --- slips that are mended ---
 
-    def checked(self, kind: str) -> str:
+    def correct_terminal(self, kind: str) -> str:
         """The terminal that was read, or the one that is obviously meant."""
         scanner, automaton = self.scanner, self.automaton
+        # 3kg
         if kind == "<quantity>" and scanner.glued:
-            kind = self._glued()
+            kind = self._split_quantity()
+        # a head whose brace is on the next line
         elif kind == "<newline>" and automaton.accepts("{") and not automaton.accepts(kind):
-            return self._opened(kind)
+            return self._supply_brace(kind)
+        # a parameter that was named `true`
         elif kind in self.reserved and kind in ("true", "false"):
             return "<name>" if automaton.accepts("<name>") else kind
         elif kind not in automaton.row or kind in _SLIPS:
             if automaton.accepts(kind):
                 return kind
+            # param k == 3
             if kind == "==" and automaton.accepts("="):
-                self._error(("E111", f"'==' compares; {self._defined()}", "="), self._token(), "=")
+                self._error(("E111", f"'==' compares; {self._hint_of_equals()}", "="), self._token(), "=")
                 kind = "="
+            # let x := 3
             elif kind == ":=" and automaton.accepts("="):
-                self._error(("E113", f"':=' assigns at an event; {self._defined()}", "="), self._token(), "=")
+                self._error(("E113", f"':=' assigns at an event; {self._hint_of_equals()}", "="), self._token(), "=")
                 kind = "="
+            # n = 3 in an event
             elif kind == "=" and automaton.accepts(":="):
                 self._error(("E113", "an action assigns with ':='", ":="), self._token(), ":=")
                 kind = ":="
             elif kind == "if" and automaton.body()[0] == len(automaton.states):
                 return kind  # a statement of other languages
+            # param in = 3: read as a name from here on
             elif kind in RESERVED and automaton.accepts("<name>") and not automaton.accepts("("):
                 if kind not in self.reserved:
                     self._error(("E115", f"'{kind}' is reserved and cannot be a name", f"{kind}_"), self._token())
                 self.reserved.add(kind)
                 kind = "<name>"
+            # x => 0
             elif kind == "=" and automaton.accepts(">=") and self.scanner.text[self.scanner.end :][:1] in (">", "<"):
                 scanner = self.scanner
                 meant = f"{scanner.text[scanner.end]}="
@@ -84,12 +92,13 @@ class Recovery(Faults):
                 said = f"'={meant[0]}' is no comparison: its sign comes first"
                 self._error(("E113", said, meant), self._token(), meant)
                 kind = meant
+            # when x = 0
             elif kind == "=" and automaton.accepts("=="):
                 self._error(("E113", "'=' defines; a comparison is written with '=='", "=="), self._token(), "==")
                 kind = "=="
         return kind
 
-    def _opened(self, kind: str) -> str:
+    def _supply_brace(self, kind: str) -> str:
         """A head without its brace, which stands on the next line or is missing before a block further right."""
         scanner, automaton = self.scanner, self.automaton
         start = self._statement_start()
@@ -105,26 +114,26 @@ class Recovery(Faults):
             return kind
         accepted = [terminal for terminal in automaton.row if automaton.accepts(terminal)]
         line = scanner.text[start : scanner.start].rstrip()
-        self._error(complaints.expected(accepted, kind, "\n", line, word), self._token())
+        self._error(complaints.unexpected_token(accepted, kind, "\n", line, word), self._token())
         scanner.open_block()
         return "{"
 
-    def _glued(self) -> str:
+    def _split_quantity(self) -> str:
         """A number with its unit grown to it: read as a quantity."""
         scanner = self.scanner
         scanner.glued = False
         unit = scanner.unit or (scanner.end, scanner.end)
         text = scanner.text
-        word = complaints.quoted(text[scanner.start : scanner.end])
+        word = complaints.quote_token(text[scanner.start : scanner.end])
         from sysdyn.dsl.parser import foreign
 
-        help_, meant = foreign.glued(text[scanner.start : unit[0]], text[unit[0] : unit[1]])
+        help_, meant = foreign.explain_suffix(text[scanner.start : unit[0]], text[unit[0] : unit[1]])
         self._error(("E114", f"{word}: a number and its unit are separated by a space", help_), self._token(), meant)
         if meant is None:  # what is grown to it is no unit: one may follow
             scanner.unit_behind()
         return "<quantity>" if self.automaton.accepts("<quantity>") else "<number>"
 
-    def _defined(self) -> str:
+    def _hint_of_equals(self) -> str:
         """What the author writes where '=' is wanted."""
         word, _ = self._first_word(self.scanner.statement)
         if word in ("phi", "psi", "gamma"):
@@ -154,19 +163,23 @@ class Recovery(Faults):
             return
         size, body = automaton.body()
         first = size == len(automaton.states)
+        # one brace too many
         if kind == "}" and body == "item" and (first or automaton.accepts("<newline>")):
             self._error(("E112", "'}' closes nothing that is open", None), self._token())
             if first:
                 scanner.restart(scanner.end, fresh=True)
             return
+        # the file ends inside of a block
         if kind == "<end>" and automaton.accepts("}"):
             self._close_all()
             return
+        # a block that was not closed, before the next item
         if body != "item" and self._brace_is_missing():
             return
         if body == "item" and first and self._head_is_missing():
             return
         self._complain(kind)
+        # a head that cannot be read, with a block: its statements can
         if kind != "{" and automaton.accepts("{"):
             from sysdyn.dsl.parser import headless
 
@@ -244,6 +257,7 @@ class Recovery(Faults):
         scanner = self.scanner
         brackets = scanner.brackets
         for _ in range(MAX_SKIPPED):
+            # the next line begins a statement
             if scanner.suspect is not None:
                 del brackets[base:]
                 scanner.restart(scanner.suspect, fresh=True)
@@ -252,12 +266,15 @@ class Recovery(Faults):
             if kind == "<end>":
                 del brackets[base:]
                 return False
+            # the end of this statement
             if kind == "<newline>" and not any(item.sign == "{" for item in brackets[base:]):
                 del brackets[base:]
                 scanner.pending = True
                 return False
+            # the end of the block around it
             if kind == "}" and self._leaves_block(base, body):
                 return False
+            # a block inside of what could not be read
             if kind == "{" and len(brackets) == base + 1 and self._mend_head(start):
                 return True
             kind = scanner.read(())

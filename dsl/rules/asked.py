@@ -60,18 +60,22 @@ class Asked:
         self._parameters: Mapping[str, Parameter] = model.parts.parameters
         self._elements = tuple(elements)
         conditions = [(r.condition, r.loops) for r in model.parts.requirements]
+        # a linear law has a modulus that is not negative
         for branch in model.parts.branches:
             slope = modulus(branch)
             if slope is not None:
                 conditions.append((ex.compare(">=", slope, ex.const(0.0)), branch.loops))
+        # nor is a bound of friction
         for bound, draft in friction_bounds(model):
             conditions.append((ex.compare(">=", bound, ex.const(0.0)), draft.loops))
+        # sizes are whole numbers
         for name in sorted(model.resolver.whole):
             parameter = model.parts.parameters.get(name)
             if parameter is not None and parameter.values and not parameter.shape:
                 size = ex.param(name)
                 conditions.append((ex.compare("==", size, ex.call("floor", size)), ()))
         self._conditions = [(c, loops, self._read(c, loops)) for c, loops in conditions]
+        # nonlinear dissipators are judged by samples
         bent = (b for b in model.parts.branches if b.kind == "dissipator" and not b.domain.pseudo)
         self._laws = [(b, self._read(b.law, b.loops)) for b in bent if b.law is not None and modulus(b) is None]
         self._of: dict[frozenset[str], Conditions] = {}
@@ -86,7 +90,7 @@ class Asked:
             waiting = [v for name in new if (p := self._parameters.get(name)) is not None for v in p.values]
         return frozenset(found)
 
-    def of(self, names: frozenset[str]) -> Conditions:
+    def conditions_of(self, names: frozenset[str]) -> Conditions:
         """The conditions on these parameters."""
         if names not in self._of:
             mine = [(c, loops) for c, loops, read in self._conditions if read & names]
@@ -105,7 +109,7 @@ class Asked:
 
     def holds(self, numbers: Mapping[Key, float]) -> bool:
         """Whether every condition holds with these numbers."""
-        mine = self.of(frozenset(key if isinstance(key, str) else str(key[0]) for key in numbers))
+        mine = self.conditions_of(frozenset(key if isinstance(key, str) else str(key[0]) for key in numbers))
         scalar = all(isinstance(key, str) for key in numbers)
         if scalar and not all(b.compared(numbers[b.name], b.limit) for b in mine.bounds):
             return False

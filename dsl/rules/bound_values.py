@@ -44,6 +44,7 @@ def run(model: Elaborator, known: Values, report: Report, observations: Iterable
     if not _sizes(model, known, report) or not _elements(model, known, report):
         return  # the others go through every element
     _allowances(model, known, report)
+    # `require` of parameters alone: once for each element under its loops
     for r in model.parts.requirements:
         read = min(map(str, ex.variables(r.condition)), default=None)
         if read is not None:
@@ -51,18 +52,20 @@ def run(model: Elaborator, known: Values, report: Report, observations: Iterable
             message = f"require {text} reads '{read}', which is no parameter: it changes in a run"
             report.error("E322", message, r.place, help=f"expect always: {text}")
             continue
+        # the first element for which it fails
         for at in r.failures(known):
             met = {n: known.number(n, at) for n in _parameters(r.condition)}
             if not any(map(math.isnan, met.values())):
                 text = format_expression(r.written)
                 said = {ex.substitute(n, as_constants(at)): value for n, value in met.items()}
-                shown = ", ".join(_valued(n, value, model) for n, value in said.items())
+                shown = ", ".join(_assignment_text(n, value, model) for n, value in said.items())
                 shown = shown or ", ".join(f"{i} = {v:g}" for i, v in at.items())
                 report.error("E322", f"require {text} fails: {shown}", r.place, help=f"values for which {text}")
                 break
     traced = [(o.expression, (), o.place) for o in observations]
+    # division by zero anywhere, also in what is traced
     for node, loops, place in (*looped_expressions_of(model), *traced):
-        if not _undefined(node, place, report):
+        if not _report_constants(node, place, report):
             _divisions(model, node, tuple(loops), place, known, report)
     _frictions(model, known, report)
     _dynamics(model, known, report)
@@ -97,7 +100,7 @@ def _frictions(model: Elaborator, known: Values, report: Report) -> None:
             if value < 0.0:
                 of = f"'{draft.element}'" if draft.element else draft.label
                 names = {n: known.number(n, at) for n in _parameters(bound)}
-                shown = ", ".join(_valued(n, v, model) for n, v in names.items())
+                shown = ", ".join(_assignment_text(n, v, model) for n, v in names.items())
                 told = shown or f"{value:g} in SI units"
                 message = f"the dry friction of {of} is negative, it delivers power: {told} (active element)"
                 report.error("E313", message, draft.place, help="a bound of zero or more: abs(c), max(c, 0)")
@@ -108,13 +111,13 @@ def _parameters(node: Node) -> list[Node]:
     return [n for n in dict.fromkeys(nodes_of(node)) if n.op == "param"]
 
 
-def _valued(node: Node, value: float, model: Elaborator) -> str:
+def _assignment_text(node: Node, value: float, model: Elaborator) -> str:
     """`R = -3 ohm`: a parameter with its value in its own unit."""
     unit = model.parts.parameters[node.data].unit if node.data in model.parts.parameters else None
     return f"{node} = {value:g}" if unit is None else f"{node} = {quantity(value, unit)}"
 
 
-def _undefined(root: Node, place: Place, report: Report) -> bool:
+def _report_constants(root: Node, place: Place, report: Report) -> bool:
     """E324 where a constant of an expression is no number, or infinite as a term of a sum."""
     for node, _ in _always(root, ()):
         constants = (node.data,) if node.op == "const" else (node.data[0], *node.data[1]) if node.op == "sum" else ()
@@ -141,7 +144,10 @@ def _divisions(
             if exponent < 0 and _is_constant(factor) and (at := _root(factor, within, known)) is not None:
                 names = _parameters(ex.substitute(factor, as_constants(at)))
                 told = ex.substitute(node, as_constants(at)) if names else _as_written(node)
-                shown = ", ".join(_valued(n, known.number(n), model) for n in names) or f"{_as_written(factor)} = 0"
+                shown = (
+                    ", ".join(_assignment_text(n, known.number(n), model) for n in names)
+                    or f"{_as_written(factor)} = 0"
+                )
                 report.error("E324", f"division by zero with the values bound: {told}, {shown}", place)
                 return
 
@@ -209,13 +215,17 @@ def _dynamics(model: Elaborator, known: Values, report: Report) -> None:
         said = given.get(state.name, [])
         if not state.shape or not said or (len(said) == 1 and _whole(said[0], state)):
             continue
-        counts = _counted([(dynamic.state.args, dynamic.loops) for dynamic in said], known)
+        counts = _count_elements([(dynamic.state.args, dynamic.loops) for dynamic in said], known)
         twice = next((element for element, number in counts.items() if number > 1), None)
-        box = [range(round(known.number(a)), round(known.number(b)) + 1) for a, b in state.shape if _known(a, b, known)]
+        box = [
+            range(round(known.number(a)), round(known.number(b)) + 1)
+            for a, b in state.shape
+            if _has_finite_bounds(a, b, known)
+        ]
         every = itertools.product(*box) if len(box) == len(state.shape) else ()
         wrong = next((element for element in every if element not in counts), None) if twice is None else twice
         if wrong is not None and (twice is not None or not report.failed):  # else a statement was refused
-            name = _indexed(state.name, wrong)
+            name = _element_name(state.name, wrong)
             what = "has no dynamic" if twice is None else f"has {counts[wrong]} dynamics"
             report.error("E507", f"state {name} {what}", said[-1].place, help="each element once")
 
@@ -226,6 +236,7 @@ OVERLAP = "bounds that do not overlap with these sizes"
 def _branches(model: Elaborator, known: Values, report: Report) -> None:
     """E106: an element of an array that several statements make."""
     pieces: dict[str, list[Branch]] = {}
+    # pieces of one array: R[1..3] and R[3..5]
     for branch in model.parts.branches:
         if branch.at:
             pieces.setdefault(re.sub(r"\[[^]]*\]", "", branch.name), []).append(branch)  # `X[2].R` is a piece of X.R
@@ -235,14 +246,17 @@ def _branches(model: Elaborator, known: Values, report: Report) -> None:
         label = (inside or [name])[0].partition("#")[0]  # what bears the index: a component, or the element itself
         if len(made) < 2 or label in told:
             continue
-        counts = _counted([(branch.at, branch.loops) for branch in made], known)
+        # an element that two of them make
+        counts = _count_elements([(branch.at, branch.loops) for branch in made], known)
         for element in (element for element, number in counts.items() if number > 1):
             told.add(label)
-            report.error("E106", f"'{_indexed(label, element)}' is declared twice", made[-1].place, help=OVERLAP)
+            report.error("E106", f"'{_element_name(label, element)}' is declared twice", made[-1].place, help=OVERLAP)
             break
 
 
-def _counted(places: Iterable[tuple[Sequence[Node], Sequence[Loop]]], known: Values) -> dict[tuple[float, ...], int]:
+def _count_elements(
+    places: Iterable[tuple[Sequence[Node], Sequence[Loop]]], known: Values
+) -> dict[tuple[float, ...], int]:
     """How often each element is meant by indices under loops."""
     counts: dict[tuple[float, ...], int] = {}
     for indices, loops in places:
@@ -252,7 +266,7 @@ def _counted(places: Iterable[tuple[Sequence[Node], Sequence[Loop]]], known: Val
     return counts
 
 
-def _indexed(name: str, element: Sequence[float]) -> str:
+def _element_name(name: str, element: Sequence[float]) -> str:
     return f"{name}[{', '.join(f'{k:g}' for k in element)}]"
 
 
@@ -262,7 +276,7 @@ def _whole(dynamic: Dynamic, state: State) -> bool:
     return dynamic.state.args == own and loop_ranges(dynamic.loops) == state.shape
 
 
-def _known(first: Node, last: Node, known: Values) -> bool:
+def _has_finite_bounds(first: Node, last: Node, known: Values) -> bool:
     return math.isfinite(known.number(first) + known.number(last))
 
 
@@ -277,12 +291,12 @@ def _elements(model: Elaborator, known: Values, report: Report) -> bool:
     counted += [(r.name, _count(r.loops, known), r.place, budget.UNKNOWN) for r in rows]
     counted += [(d.state.data[0], _count(d.loops, known), d.place, budget.UNKNOWN) for d in parts.dynamics if d.loops]
     counted += [("require", _count(r.loops, known), r.place, budget.TERM) for r in parts.requirements if r.loops]
-    left = float(budget.granted())
+    left = float(budget.memory_limit())
     for name, count, place, price in counted:
         left -= count * price
         if left < 0.0:
-            message = f"the {count:.10g} elements of '{name}' need {budget.shown(count * price)}"
-            granted = budget.shown(budget.granted())
+            message = f"the {count:.10g} elements of '{name}' need {budget.format_bytes(count * price)}"
+            granted = budget.format_bytes(budget.memory_limit())
             report.error("E119", f"{message}; one model may take {granted} in all", place, help="fewer elements")
             return False
     return True
@@ -306,16 +320,19 @@ def _count(loops: Sequence[Loop], known: Values) -> float:
 
 
 def _indices(model: Elaborator, known: Values, report: Report) -> None:
+    """E805: indices outside of their array, lists of another length, indices that are no whole numbers."""
     for use in model.resolver.uses:
         low, high = known.bounds(use.value, use.loops)
         first, last = (known.number(b) for b in use.shape)
         if any(math.isnan(v) for v in (low, high, first, last)) or low > high:
             continue
         wrong = low if low < first else high if high > last else None
+        # x[1..n] = [a, b]: as many values as elements
         if use.given is not None:
             if low != first + use.given - 1.0:
                 message = f"'{use.name}' has {low - first + 1.0:g} elements there, {use.given} are given"
                 report.error("E805", message, use.place, help="a value for each element, or one for all")
+        # x[n+1] of x[1..n]
         elif wrong is not None:
             span = use.place.span
             written = " ".join(use.place.source.text[span.start : span.end].split())

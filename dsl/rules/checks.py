@@ -39,25 +39,33 @@ def constraints(model: Elaborator, report: Report) -> None:
         expression, _ = signals_held(constraint.expression)
         nodes = unknowns_of(expression)
         accelerations = [n for n in nodes if n.data[2]]
+        # phi x'' = 0
         if accelerations:
             message = f"{what} contains {accelerations[0]}: accelerations are results, not data"
             report.error("E518", message, constraint.place)
             continue
+        # may read anything but accelerations
         if constraint.kind == "gamma":
             continue
         implicit = [n for n in nodes if letter(n) in ("e", "kappa", "mu")]
         flows = [n for n in nodes if letter(n) == "f"]
+        # a phi or psi that reads an implicit unknown or a multiplier
         if implicit:
-            report.error("E502", f"{what} contains {_named(implicit[0])}", constraint.place, help="it is a gamma")
+            report.error(
+                "E502", f"{what} contains {_describe_unknown(implicit[0])}", constraint.place, help="it is a gamma"
+            )
+        # phi x' = 0
         elif constraint.kind == "phi" and flows:
             report.error("E501", f"{what} contains the flow {flows[0]}", constraint.place, help="it is a psi")
         elif constraint.kind == "phi" and not [n for n in nodes if letter(n) == "q"]:
             report.error(
                 "E511", f"{what} contains no coordinate", constraint.place, help="'require' checks a parameter"
             )
+        # psi x = 0
         elif constraint.kind == "psi" and not flows:
             message = f"{what} contains no flow" + (": it is a phi" if nodes else "")
             report.error("E511", message, constraint.place, help="a relation between displacements is a phi")
+        # x'*y' = 0 is not workless
         elif constraint.kind == "psi":
             pair = _nonlinear(expression, flows)
             if pair:
@@ -66,7 +74,7 @@ def constraints(model: Elaborator, report: Report) -> None:
                 report.error("E503", message, constraint.place, help=help_)
 
 
-def _named(node: Node) -> str:
+def _describe_unknown(node: Node) -> str:
     kind = {"e": "the implicit unknown", "kappa": "the multiplier", "mu": "the multiplier"}[letter(node)]
     return f"{kind} {node}"
 
@@ -90,8 +98,10 @@ def states(model: Elaborator, report: Report) -> None:
     told = set[Place]()
     for state in model.parts.states:
         places = given.get(state.name, [])
+        # told of the first instance alone
         if not places and state.place in told:  # of another instance of the same component
             continue
+        # its dynamic is there, and wrong: told already
         if not places and state.name in model.parts.given:
             continue
         if not places:
@@ -99,6 +109,7 @@ def states(model: Elaborator, report: Report) -> None:
             own = state.name.rpartition(".")[2]
             help_ = f"dynamic {own}' = ...; what forces move is a coord {own}: translation"
             report.error("E507", f"state {state.name} has no dynamic", state.place, help=help_)
+        # two dynamics of one state; of arrays the elements are counted elsewhere
         elif len(places) > 1 and not state.shape:
             related = (Related("and here", places[1]),)
             report.error("E507", f"state {state.name} has {len(places)} dynamics", places[0], related=related)
@@ -145,6 +156,7 @@ def _is_result(node: Node) -> bool:
 
 def smoothness(model: Elaborator, report: Report) -> None:
     """W301: a law with a corner or a jump where its flow vanishes; a content with a corner there is set-valued."""
+    # a signum in a work or gamma is a corner of an ordinary law
     for work in model.parts.works:
         _corner(work.effort, work.place, report)
     for constraint in model.parts.constraints:
@@ -152,6 +164,7 @@ def smoothness(model: Elaborator, report: Report) -> None:
             _corner(constraint.expression, constraint.place, report)
     _set_valued(model, report)
     _on_reactions(model, report)
+    # of a content it is set-valued friction, which switches resolve where they can
     for energy in model.parts.energies:
         if energy.function != "D":
             continue
@@ -250,7 +263,7 @@ def expressions_of(model: Elaborator) -> Iterable[tuple[Node, Place]]:
 
 
 def looped_expressions_of(model: Elaborator) -> Iterable[tuple[Node, Sequence[Loop], Place]]:
-    """The same with the loops under which each stands."""
+    """Expressions of a model in which numbers are bound, with the loops under which each stands and its place."""
     for b in model.parts.branches:
         if b.law is not None:
             yield b.law, b.loops, b.place

@@ -23,7 +23,7 @@ def counted_twice(network: Network, report: Report) -> None:
             branch = laws.get(node.data[0]) if node.data[1][0] == "b" else None
             if branch is None or branch.kind != function.edge or letter(node) != function.own:
                 continue
-            if _alone(energy.expression, node):
+            if _changes_alone(energy.expression, node):
                 name = branch.name.partition("#")[0]
                 word = "content" if function.edge == "dissipator" else "energy"
                 message = f"energy of '{name}' is counted twice: a law and '{word} {function.name}' on the same branch"
@@ -32,7 +32,7 @@ def counted_twice(network: Network, report: Report) -> None:
                 break
 
 
-def _alone(expression: Node, own: Node) -> bool:
+def _changes_alone(expression: Node, own: Node) -> bool:
     """Whether the expression changes with `own` while all other unknowns are zero."""
     others = {n: ex.const(0.0) for n in unknowns_of(expression) if n is not own and letter(n) != "s"}
     slope = derivative(ex.substitute(expression, others), own)

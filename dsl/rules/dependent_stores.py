@@ -77,16 +77,19 @@ def _cuts(branches: Sequence[Branch], kinds: tuple[str, str]) -> Iterator[list[B
     """What joins each part, that the other branches hold together, to the rest; the ground's part is the rest."""
     root: dict[_Point, _Point] = {}
 
+    # union-find over nodes
     def part(point: _Point) -> _Point:
         while (above := root.setdefault(point, point)) != point:
             root[point] = point = root[above]
         return point
 
+    # nodes that anything but these kinds joins are one part
     for b in branches:
         one, other = part(_point(b.plus)), part(_point(b.minus))
         if b.kind not in kinds and one != other:
             root[other if one is None else one] = one if one is None else other
     crossing: dict[_Point, list[Branch]] = {}
+    # what crosses from a part to another one; the ground's part is told by the others
     for b in branches:
         ends = {part(_point(b.plus)), part(_point(b.minus))}
         for end in ends if b.kind in kinds and len(ends) > 1 else ():

@@ -37,7 +37,7 @@ def floating(model: Elaborator, observations: Sequence[Observation], report: Rep
             read_here = [n for n in ex.variables(expression) if _effort(n) in names]
             if read_here and not _of_differences(expression, read_here):
                 first = read_here[0].data[0]
-                message = f"the effort of '{first}' has no reference: nothing joins {_listed(names)} to ground"
+                message = f"the effort of '{first}' has no reference: nothing joins {_quote_names(names)} to ground"
                 help_ = f"an element from one of them to ground, or {first}.e less that of another"
                 report.note("N611", message, place, help=help_)
                 break
@@ -47,7 +47,7 @@ def _moving(expectations: Iterable[Expectation]) -> Iterable[Expectation]:
     return (e for e in expectations if e.moment != "static")
 
 
-def _listed(names: Sequence[str]) -> str:
+def _quote_names(names: Sequence[str]) -> str:
     return ", ".join(f"'{n}'" for n in names[:5]) + (", ..." if len(names) > 5 else "")
 
 
@@ -61,10 +61,12 @@ def _loose(model: Elaborator) -> list[tuple[str, ...]]:
     parts = model.parts
     names = dict.fromkeys([*(n.name for n in parts.nodes if n.domain.common == "effort"), ""])
     joined = Joined[str]()
+    # branches join their ends
     for branch in parts.branches:
         ends = _ends(branch)
         if all(e in names for e in ends):
             joined.join(*ends)
+    # a potential that an equation reads is tied to something
     for node in ex.topological(expressions(parts, "constraints", "energies", "works")):
         family = _effort(node)
         if family in names and family is not None:

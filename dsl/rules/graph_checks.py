@@ -17,7 +17,7 @@ from sysdyn.dsl.model.signs import Reals, reals
 from sysdyn.dsl.model.values import Values, as_constants
 from sysdyn.dsl.parser.notes import PREDEFINED
 from sysdyn.dsl.rules import lossless
-from sysdyn.dsl.rules.untouched import Box, shown, untouched
+from sysdyn.dsl.rules.untouched import Box, box_text, first_gap
 from sysdyn.dsl.text.diagnostics import Report
 
 NEAR = 3
@@ -60,6 +60,7 @@ def _lonely_nodes(model: Elaborator, known: Values, read: frozenset[str], report
     touched: dict[str, float] = {}
     empty: dict[str, list[str]] = {}
     boxes: dict[str, list[Box]] = {}
+    # how many elements end at each node; of arrays the boxes of indices
     for branch, terminal in _ends(model.parts.branches):
         assert terminal.node is not None
         count = _count(branch, known)
@@ -69,8 +70,9 @@ def _lonely_nodes(model: Elaborator, known: Values, read: frozenset[str], report
         if terminal.at:
             found = tuple(known.bounds(at, branch.loops) for at in terminal.at)
             boxes.setdefault(terminal.node, []).append(tuple((min(b), max(b)) for b in found))
-    mentioned = read | _mentioned(model)
+    mentioned = read | _read_nodes(model)
     alike: dict[str, list[str]] = {}
+    # an electrical node needs two ends, a mechanical one, of a family each element some
     for node in model.parts.nodes:
         alike.setdefault(_beginning(node), []).append(node.name)
     for node in model.parts.nodes:
@@ -80,19 +82,21 @@ def _lonely_nodes(model: Elaborator, known: Values, read: frozenset[str], report
         if node.name in mentioned or node.name in PREDEFINED or not size > 0 or math.isnan(count):
             continue
         near = alike[_beginning(node)][: NEAR + 1]
+        # too few altogether
         if count < wanted:
             _lonely(node, count, near, empty.get(node.name, []), report)
-        elif node.shape and (left := _left(node, boxes.get(node.name, []), known)) is not None:
-            message = f"node '{node.name}[{shown(left)}]' touches no element"
+        # elements of the family that none touches
+        elif node.shape and (left := _first_untouched(node, boxes.get(node.name, []), known)) is not None:
+            message = f"node '{node.name}[{box_text(left)}]' touches no element"
             report.error("E409", message, node.place, help="connect it to an element, or declare fewer nodes")
 
 
-def _left(node: NodeFamily, boxes: Sequence[Box], known: Values) -> Box | None:
+def _first_untouched(node: NodeFamily, boxes: Sequence[Box], known: Values) -> Box | None:
     """The first elements of a family that nothing touches."""
     whole = tuple((known.number(first), known.number(last)) for first, last in node.shape)
     if not all(math.isfinite(a + b) for box in (whole, *boxes) for a, b in box if (a, b) != EMPTY):
         return None
-    return untouched(whole, [box for box in boxes if EMPTY not in box])
+    return first_gap(whole, [box for box in boxes if EMPTY not in box])
 
 
 def _beginning(node: NodeFamily) -> str:
@@ -110,7 +114,7 @@ def _lonely(node: NodeFamily, count: float, alike: list[str], empty: list[str], 
     report.error("E409", f"node '{node.name}' touches {how}", node.place, help=help_)
 
 
-def _mentioned(model: Elaborator) -> frozenset[str]:
+def _read_nodes(model: Elaborator) -> frozenset[str]:
     """Nodes whose quantities stand in energies, works and constraints, and those that components hang on."""
     roots = expressions(model.parts, "energies", "constraints", "works", "branches.on")
     return frozenset(
@@ -122,16 +126,19 @@ def _loops_of_sources(model: Elaborator, report: Report) -> None:
     """E411: sources that fix one quantity twice: effort sources between common-effort nodes, flow sources dually."""
     found: list[tuple[_End, _End, str]] = []
     joined = Joined[_End]()
-    blocked = _blocked(model)
+    blocked = _constrained_at_times(model)
     for branch in model.parts.branches:
+        # sources of the common quantity between two nodes: effort sources of an electrical network
         if branch.kind != branch.domain.common or branch.loops or branch.plus is None or branch.minus is None:
             continue
         if (branch.name, "bf" if branch.kind == "effort" else "be") in blocked:  # then it fixes nothing
             continue
         plus, minus = ((branch.domain.name, t.node, t.at) for t in (branch.plus, branch.minus))
+        # a tree as yet: kept for its paths
         if joined.join(plus, minus):
             found.append((plus, minus, branch.name))
             continue
+        # closes a loop: the sources around it
         names = ", ".join((*_between(found, plus, minus), branch.name))
         message = f"loop of {branch.kind} sources: {names} fix the {branch.kind} between two nodes twice"
         if plus == minus:
@@ -142,7 +149,7 @@ def _loops_of_sources(model: Elaborator, report: Report) -> None:
     _cutsets(model, report)
 
 
-def _blocked(model: Elaborator) -> set[tuple[str, str]]:
+def _constrained_at_times(model: Elaborator) -> set[tuple[str, str]]:
     """Branches and their variables that constraints hold at times: a body diode lets no current back."""
     held = (draft.value for draft in model.parts.drafts if draft.kind in ("psi", "guarded"))
     return {v.data[:2] for value in held for v in ex.variables(value) if v.op == "var"}
@@ -151,11 +158,13 @@ def _blocked(model: Elaborator) -> set[tuple[str, str]]:
 def _between(tree: list[tuple[_End, _End, str]], start: _End, goal: _End) -> list[str]:
     """Names of the sources of a tree on the way between two of its ends, in the order of the text."""
     touching: dict[_End, list[int]] = {}
+    # which sources touch each end
     for k, (plus, minus, _) in enumerate(tree):
         touching.setdefault(plus, []).append(k)
         touching.setdefault(minus, []).append(k)
     came: dict[_End, tuple[_End, int] | None] = {start: None}
     left = [start]
+    # depth first from the start, remembering whence
     while goal not in came:
         here = left.pop()
         for k in touching[here]:
@@ -165,6 +174,7 @@ def _between(tree: list[tuple[_End, _End, str]], start: _End, goal: _End) -> lis
                 came[other] = here, k
                 left.append(other)
     way = []
+    # back from the goal
     while (step := came[goal]) is not None:
         goal = step[0]
         way.append(step[1])
@@ -237,7 +247,7 @@ def _sign(branch: Branch, known: Values, report: Report) -> None:
         return
     slope = modulus(branch)
     if slope is None:
-        _modulated(branch, derivative(branch.law, own), own, known, report)
+        _check_modulus(branch, derivative(branch.law, own), own, known, report)
         return
     found = ((at, known.number(slope, at)) for at in known.cases(slope, branch.loops))
     at, value = next((case for case in found if case[1] < 0.0), ({}, 0.0))
@@ -247,7 +257,7 @@ def _sign(branch: Branch, known: Values, report: Report) -> None:
     _negative(branch, f"{value:g}" if slope.op == "const" else f"{slope} = {value:g}", report)
 
 
-def _modulated(branch: Branch, slope: Node | None, own: Node, known: Values, report: Report) -> None:
+def _check_modulus(branch: Branch, slope: Node | None, own: Node, known: Values, report: Report) -> None:
     """E321, E325 of a linear law whose modulus moves: where it is negative whatever time and other unknowns are."""
     nodes = () if slope is None else ex.topological([slope])
     if slope is None or own in nodes:
@@ -264,6 +274,7 @@ def _modulated(branch: Branch, slope: Node | None, own: Node, known: Values, rep
 
 
 def _negative(branch: Branch, shown: str, report: Report) -> None:
+    """Report a modulus below zero: E321 of an inertia, E325 of a stiffness, capacitance, resistance or damping."""
     name = branch.name.rpartition("#")[0] or branch.name
     if branch.kind == "kinetic":
         message = f"'{name}': the inertia is negative ({shown}): the motion is not determined forward in time"

@@ -19,6 +19,7 @@ HELP = "a two-sided conductor: entropy H/Ta leaves a, H/Tb enters b; or the pseu
 
 def heat(network: Network, report: Report) -> None:
     """Dissipators and contents of true thermal domains."""
+    # entropy is no energy: a dissipator between temperatures has to give its heat to somewhere
     for branch in network.branches:
         if branch.kind != "dissipator" or branch.law is None or not _true(branch.domain):
             continue
@@ -28,6 +29,7 @@ def heat(network: Network, report: Report) -> None:
             message = f"'{name}': a dissipator in '{branch.domain.name}' loses energy: the heat it absorbs goes nowhere"
             report.error("E320", message, branch.place, help=HELP)
     diagram = Diagram(network)
+    # contents of temperature or entropy flow likewise
     for energy in network.energies:
         if STATE_FUNCTIONS[energy.function].edge != "dissipator":
             continue

@@ -34,7 +34,7 @@ _Part = tuple[str, tuple[Loop, ...], Node]
 def run(model: Elaborator, known: Values, report: Report) -> None:
     """The rule for every component that claims it."""
     for space, body in model.bodies:
-        claims = body.of(syntax.Lossless)
+        claims = body.statements_of(syntax.Lossless)
         if not claims:
             continue
         place = Place(space.source, claims[0][0].span)
@@ -50,7 +50,7 @@ def _inside(name: str, path: str) -> bool:
     return name.startswith(f"{path}.")
 
 
-def _said(model: Elaborator, path: str) -> Iterator[Energy | Work | Constraint]:
+def _statements_of(model: Elaborator, path: str) -> Iterator[Energy | Work | Constraint]:
     for owner, statements in model.parts.owned.items():
         if owner == path or _inside(owner, path):
             yield from statements
@@ -63,17 +63,19 @@ def _stores(model: Elaborator, path: str) -> Iterator[str]:
     )
     yield from (
         f"an energy {s.function}"
-        for s in _said(model, path)
+        for s in _statements_of(model, path)
         if isinstance(s, Energy) and s.function not in ("D", "G") and not s.function.startswith("kept")
     )
 
 
 def _powers(model: Elaborator, path: str) -> Iterator[_Part]:
     """What absorbs power inside a component."""
+    # dissipators and sources inside
     for b in model.parts.branches:
         if b.kind in WHAT and _inside(b.name, path) and b.law is not None:
             yield f"'{b.name}' is {WHAT[b.kind]}", b.loops, _power(b, b.law)
-    for s in _said(model, path):
+    # works, contents, and constraints that move with time
+    for s in _statements_of(model, path):
         if isinstance(s, Work):
             yield "a work", s.loops, ex.neg(ex.mul(s.effort, _rate(s.on)))
         elif isinstance(s, Energy) and s.function in ("D", "G"):
@@ -92,12 +94,16 @@ def _power(branch: Branch, law: Node) -> Node:
     if branch.on is not None:
         known = {f: _rate(branch.on)}
     else:
-        known = {e if letter == "e" else f: ex.sub(_at(branch.plus, kind), _at(branch.minus, kind))}
+        known = {
+            e if letter == "e" else f: ex.sub(
+                _quantity_of_node(branch.plus, kind), _quantity_of_node(branch.minus, kind)
+            )
+        }
     other = f if branch.side == "e" else e
     return ex.mul(ex.substitute(law, known), known.get(other, other))
 
 
-def _at(end: Terminal | None, kind: str) -> Node:
+def _quantity_of_node(end: Terminal | None, kind: str) -> Node:
     """The effort or flow of a node; zero of ground."""
     return ex.const(0.0) if end is None or end.node is None else ex.var(end.node, kind, *end.at)
 

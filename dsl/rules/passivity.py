@@ -66,16 +66,19 @@ MEANT = {
 
 
 def _judge(branch: Branch, law: Node, known: Values, laws: _Laws, report: Report) -> None:
+    """E313: a dissipator that delivers power at some value of its own variable, found by samples of its law."""
     if law.op == "sum" and law.data[0] == 0.0 and len(law.args) == 1 and law.args[0].op == "var":
         return  # 5 ohm*f
     factors = zip(law.data, law.args, strict=True) if law.op == "mul" else ()
     if law.op == "mul" and all(e == 1.0 if a.op == "var" else a.op == "param" for e, a in factors):
         return  # R*f, and what reads other unknowns
+    # a law of one own variable and parameters: others are not judged alone
     nodes = ex.topological([law])
     own = [n for n in nodes if n.op == "var"]
     if len(own) != 1 or own[0].data[0] != branch.name or any(n.op in ("time", "table") for n in nodes):
         return
     params, like = [n for n in nodes if n.op == "param"], _like(nodes, own[0], laws)
+    # each element with its numbers, up to the first that delivers
     for at in known.cases(law, branch.loops):
         values = (known.number(n, at) for n in params)
         found = _delivers(like, dict(zip(like.params, values, strict=True)) | at)

@@ -26,6 +26,7 @@ def reciprocity(network: Network, known: Values, report: Report) -> None:
         if b.law is not None and (b.kind, b.side) in _CONJUGATE:
             stores.setdefault(b.name, []).append(b)
     several: set[str] = set()
+    # de1/dq2 = de2/dq1: an energy has one mixed derivative
     for one, other, difference in _pairs(stores):
         held = {n: known.number(n) for n in ex.topological([difference]) if n.op == "param" and not n.args}
         if any(abs(value) > 1e-9 for value in samples(difference, held)):
@@ -37,10 +38,11 @@ def reciprocity(network: Network, known: Values, report: Report) -> None:
             help_ = "write it as gamma or transactor (not a store), or correct it"
             report.error("E310", message, one.place, related=related, help=help_)
             several |= {one.name, other.name}
+    # a store that reads another q or p, with no store that reads its own
     for branches in stores.values():
         for branch in branches:
             if branch.name not in several:
-                _lost(branch, report)
+                _check_store_law(branch, report)
 
 
 def _pairs(stores: dict[str, list[Branch]]) -> Iterator[tuple[Branch, Branch, Node]]:
@@ -52,6 +54,7 @@ def _pairs(stores: dict[str, list[Branch]]) -> Iterator[tuple[Branch, Branch, No
             name = node.data[0]
             other = next((b for b in stores.get(name, ()) if b.at == node.args), None)
             pair = frozenset((one.name, name))
+            # another store of the same element index, edge and component
             if other is None or name == one.name or pair in done or (one.kind, one.side) != (other.kind, other.side):
                 continue
             if letter(node) != _CONJUGATE[one.kind, str(one.side)] or node.data[1][0] != "b":
@@ -64,7 +67,7 @@ def _pairs(stores: dict[str, list[Branch]]) -> Iterator[tuple[Branch, Branch, No
             yield one, other, ex.sub(derivative(one.law, node), derivative(other.law, mine))
 
 
-def _lost(branch: Branch, report: Report) -> None:
+def _check_store_law(branch: Branch, report: Report) -> None:
     """E304: the law of a store may not depend on another displacement or momentum."""
     assert branch.law is not None
     for other in unknowns_of(branch.law, "q p"):

@@ -18,17 +18,20 @@ def state_functions(network: Network, report: Report) -> None:
     for energy in network.energies:
         unknowns = unknowns_of(energy.expression)
         rates = [n for n in unknowns if n.data[2]]
+        # the rate of a state is an expression, not a variable of the function
         if rates and rates[0].data[1] == "s":
             if rates[0].data[0] in moved:  # else it has no dynamic: that is told
                 message = f"{energy.function} contains {rates[0]}, the rate of a state"
                 help_ = f"the right side of its dynamic, or a coord {rates[0].data[0]}: what forces move"
                 report.error("E518", message, energy.place, help=help_)
+        # accelerations
         elif rates:
             message = f"{energy.function} contains {rates[0]}, a second derivative: accelerations are results, not data"
             report.error("E518", message, energy.place)
-        elif not _misplaced(energy, unknowns, diagram, report):
+        elif not _report_misplaced(energy, unknowns, diagram, report):
             _own(energy, unknowns, diagram, report)
             _kinetic(energy, unknowns, diagram, report)
+    # a kinetic store in a domain without momentum
     for branch in network.branches:
         if branch.kind == "kinetic" and not branch.domain.kinetic:
             name = branch.name.partition("#")[0]
@@ -36,12 +39,12 @@ def state_functions(network: Network, report: Report) -> None:
             report.error("E307", message, branch.place, help="a potential store, or a dissipator")
 
 
-def _misplaced(energy: Energy, unknowns: list[Node], diagram: Diagram, report: Report) -> bool:
+def _report_misplaced(energy: Energy, unknowns: list[Node], diagram: Diagram, report: Report) -> bool:
     """Whether a variable stands there that the function does not have; reported."""
     function = STATE_FUNCTIONS[energy.function]
     for node in unknowns:
         letter = diagram.letter(node)
-        allowed = function.allowed(complementary=node.data[0] in diagram.complementary)
+        allowed = function.allowed_letters(complementary=node.data[0] in diagram.complementary)
         if letter == "s" or (letter in allowed and node.data[1] != "e"):
             continue
         if letter not in LETTERS or node.data[1] == "e":

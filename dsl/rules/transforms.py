@@ -12,11 +12,13 @@ def transforms(network: Network, report: Report) -> None:
     """T and T*, V and V*, D and G over one coordinate, node or branch."""
     diagram = Diagram(network)
     owners: dict[str, dict[str, Energy]] = {name: {} for name in STATE_FUNCTIONS}
+    # which coordinate, node or branch has which function
     for energy in network.energies:
         own = STATE_FUNCTIONS[energy.function].own
         for node in unknowns_of(energy.expression):
             if diagram.letter(node) == own:
                 owners[energy.function].setdefault(node.data[0], energy)
+    # both T and T* of one store would count it twice
     for name in ("T", "V", "D"):
         transform = STATE_FUNCTIONS[name].transform
         for owner, energy in owners[name].items():

@@ -53,7 +53,7 @@ class Code:
 def codes() -> Mapping[str, Code]:
     """All codes, in the order of their numbers."""
     text = (Path(__file__).parent / "codes.toml").read_text(encoding="utf-8")
-    generated = _generated()
+    generated = _long_examples()
     found = {}
     for code, page in tomllib.loads(text).items():
         bad, good = generated[code] if code in generated else (page["bad"], page["good"])
@@ -64,9 +64,9 @@ def codes() -> Mapping[str, Code]:
 def explain(code: str) -> str:
     """The page of a code as text; raises KeyError where there is no such code."""
     page = codes()[code.upper()]
-    parts = [f"{page.severity} {page.code}: {page.title}", _wrapped(page.why)]
+    parts = [f"{page.severity} {page.code}: {page.title}", _wrap(page.why)]
     wrong = "Wrong:" if page.by == CHECK else f"Wrong, as '{page.by}' finds:"
-    parts += [wrong, _shown(page.bad), "Right:", _shown(page.good)]
+    parts += [wrong, _format_example(page.bad), "Right:", _format_example(page.good)]
     return "\n\n".join(parts) + "\n"
 
 
@@ -79,7 +79,7 @@ def index() -> str:
     return "\n\n".join(parts) + "\n\nE error, W warning, N note; sysdyn explain CODE shows one.\n"
 
 
-def _generated() -> dict[str, tuple[str, str]]:
+def _long_examples() -> dict[str, tuple[str, str]]:
     """Examples too long to be kept."""
     return {
         "E116": (f"# {'a long line ' * 1000}\n", "# a short line\n"),
@@ -92,14 +92,14 @@ def _generated() -> dict[str, tuple[str, str]]:
     }
 
 
-def _wrapped(text: str, width: int = 96) -> str:
+def _wrap(text: str, width: int = 96) -> str:
     """Words in lines."""
     import textwrap
 
     return textwrap.fill(text, width)
 
 
-def _shown(text: str) -> str:
+def _format_example(text: str) -> str:
     """An example, indented; very long ones are cut."""
     lines = text.splitlines()
     shown = [line if len(line) <= _MOST_COLUMNS else line[:_MOST_COLUMNS] + "..." for line in lines[:_MOST_LINES]]

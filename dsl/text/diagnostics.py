@@ -192,7 +192,7 @@ MOST = 200
 """Findings of one severity in one file that are shown."""
 
 
-def shortened(found: Iterable[Diagnostic]) -> list[Diagnostic]:
+def limit_findings(found: Iterable[Diagnostic]) -> list[Diagnostic]:
     """Findings without those of a file and a severity beyond MOST, whose number the note N101 gives."""
     kept: list[Diagnostic] = []
     seen: dict[tuple[str, str], list[Diagnostic]] = {}

@@ -65,11 +65,13 @@ def _snippet(place: Place, label: str, mark: str, gutter: int, tint: tuple[bool,
     rows = [f"{' ' * gutter} {bar}"]
     text = place.source.line(first)
     stop = end if last == first else len(text) + 1
+    # the line of the span, or its first and last
     parts = [(first, text, start, max(stop, start + 1))]
     if last > first:
         text = place.source.line(last)
         begin = len(text) - len(text.lstrip()) + 1
         parts.append((last, text, min(begin, end), max(end, begin + 1)))
+    # marks under what of each line belongs to the span
     for number, (line, text, left, right) in enumerate(parts):
         if number == 1 and last > first + 1:
             rows.append(f"{' ' * gutter} {paint('...', _BLUE)}")

@@ -18,12 +18,15 @@ def first_difference(left: Any, right: Any) -> tuple[Any, Any] | None:
     stack = [(left, right)]
     while stack:
         one, other = stack.pop()
+        # another kind of node
         if type(one) is not type(other):
             return one, other
+        # statements of a body, terms of a sum
         if isinstance(one, tuple):
             if len(one) != len(other):
                 return one, other
             stack.extend(zip(one, other, strict=True))
+        # fields, places left out
         elif is_dataclass(one):
             kind: type[Any] = type(one)
             stack.extend((getattr(one, name), getattr(other, name)) for name in _contents(kind))

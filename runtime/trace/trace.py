@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 from numpy.lib.mixins import NDArrayOperatorsMixin
-from sysdyn.names import stored
+from sysdyn.names import trace_name
 from sysdyn.runtime.events.plan import Happened
 from sysdyn.runtime.model.description import Floats
 from sysdyn.runtime.model.failures import TraceError
@@ -203,7 +203,7 @@ class Trace:
         """The name as it stands in the file: '/' in a quotient is U+2215 there."""
         if "audit" in name:
             name = name.removeprefix("/").replace("audit/", "audit.")
-        spelled = stored(name)
+        spelled = trace_name(name)
         return spelled if name not in self._data and spelled in self._data else name
 
     def __getitem__(self, name: str) -> Quantity:

@@ -17,7 +17,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from sysdyn.names import stored
+from sysdyn.names import trace_name
 from sysdyn.runtime import _core
 from sysdyn.runtime.events.plan import Happened
 from sysdyn.runtime.model.description import Description, Floats
@@ -70,7 +70,7 @@ def columns_of(description: Description) -> tuple[Column, ...]:
         row = description.rows[k]
         for position in range(row.size):
             if row.stored:
-                name = stored(row.named(position))
+                name = trace_name(row.named(position))
                 label = row.named(position, row.label)
                 found.append(Column(name, place, row.unit, label, row.rate))
             place += 1
@@ -104,7 +104,7 @@ def _keep(group: Any, parameters: Sequence[Parameter]) -> None:
         template = templates.get(parameter.unit)
         if template is None:
             template = templates[parameter.unit] = hdf5.template(group, parameter.unit)
-        hdf5.copy(template, group, stored(parameter.name), parameter.value)
+        hdf5.copy(template, group, trace_name(parameter.name), parameter.value)
 
 
 def clear(path: Path) -> None:

@@ -1,7 +1,7 @@
 """Equations as `sysdyn equations` prints them."""
 
 import numpy as np
-from sysdyn.cli.analysis.asked import compiled
+from sysdyn.cli.analysis.asked import compile_target
 from sysdyn.cli.main import run
 from sysdyn.cli.run.request.asked import Request
 from sysdyn.dsl.model.calculus import without_signals
@@ -22,7 +22,7 @@ def printed(capsys, name, *options):
 
 def model(name, formulation):
     report = Report()
-    made = compiled(Request(str(SEED / f"{name}.sd"), formulation=formulation, backend="numpy"), report)
+    made = compile_target(Request(str(SEED / f"{name}.sd"), formulation=formulation, backend="numpy"), report)
     return None if made is None else made[1].compiled
 
 

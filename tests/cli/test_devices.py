@@ -8,7 +8,7 @@ from sysdyn.cli.spice.model_text import DEVICES, Writer
 from sysdyn.cli.spice.netlist import Unreadable, cards
 from sysdyn.cli.spice.reading import Reader
 from sysdyn.cli.spice.temperature import Heat
-from sysdyn.cli.spice.windings import Cores, coupled
+from sysdyn.cli.spice.windings import Cores, coupled_coils
 from sysdyn.dsl.text.diagnostics import Report
 from sysdyn.dsl.text.source import SourceText
 
@@ -163,14 +163,14 @@ def test_sources_have_a_direct_part_or_a_shape():
 def test_coupled_coils_are_one_element():
     coils = {c.head: c for c in map(card, ("l1 a 0 1m ic=2", "l2 b c 4m"))}
     one = card("k1 l1 l2 0.5")
-    found = coupled(one, scope("k1"), Cores([one], coils))
+    found = coupled_coils(one, scope("k1"), Cores([one], coils))
     assert found.lines == ("k1: coupled_inductors(L1 = 1 mH, L2 = 4 mH, k = 0.5) one = a -> ground, two = b -> c",)
     assert found.initial == ("init k1.one.e = 0 V", "init k1.two.e = 0 V")
-    asked = coupled(one, scope("k1", uic=True), Cores([one], coils))
+    asked = coupled_coils(one, scope("k1", uic=True), Cores([one], coils))
     assert asked.initial == ("init k1.one.f = 2 A", "init k1.two.f = 0 A")
     again = card("k2 l2 l1 0.4")
     with pytest.raises(Unreadable, match="l1 and l2 are coupled already"):
-        coupled(again, scope("k1", "k2"), Cores([one, again], coils))
+        coupled_coils(again, scope("k1", "k2"), Cores([one, again], coils))
 
 
 @pytest.mark.parametrize(

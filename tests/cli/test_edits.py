@@ -54,30 +54,30 @@ def lines(text):
 
 def test_an_element_goes_with_its_comment_and_its_initial_values():
     target, one = candidate(TEXT, "C2")
-    left = edits.without(target, TEXT, one)
+    left = edits.remove_statement(target, TEXT, one)
     assert lines(TEXT)(left) == [
         "  C2: capacitor(C = 2*C) c -> ground", "  init C2.e = 0 V", "  init C2.f = 1 A",
     ]  # fmt: skip
     assert lines(left)(TEXT) == []
     target, one = candidate(TEXT, "R1")
-    assert lines(TEXT)(edits.without(target, TEXT, one)) == ["  R1: resistor(R = R0) a -> b # in the way"]
+    assert lines(TEXT)(edits.remove_statement(target, TEXT, one)) == ["  R1: resistor(R = R0) a -> b # in the way"]
 
 
 def test_a_source_of_zero_takes_its_place():
     target, one = candidate(TEXT, "C1", "C1: effort(e = 0 V) b -> ground")
-    found = edits.joined(target, TEXT, one)
+    found = edits.replace_by_zero_source(target, TEXT, one)
     assert lines(found)(TEXT) == ["  C1: effort(e = 0 V) b -> ground"]
     assert lines(TEXT)(found) == ["  C1: capacitor(C = C) b -> ground", "  init C1.e = 0 V"]
 
 
 def test_parameters_that_nothing_reads_any_more_go():
     target, one = candidate(TEXT, "R1")
-    left = edits.without(target, TEXT, one)
+    left = edits.remove_statement(target, TEXT, one)
     after, _ = opened(left)
     assert lines(left)(edits.unread(after, left, TEXT)) == ["  param R0 = 1 kohm # of the first"]
     twice = TEXT.replace("R = 2 ohm", "R = 2*R0")  # that another element reads stays too
     target, one = candidate(twice, "R1")
-    left = edits.without(target, twice, one)
+    left = edits.remove_statement(target, twice, one)
     assert edits.unread(opened(left)[0], left, twice) == left
     unread = TEXT.replace("R = R0)", "R = 5 ohm)")  # that nobody read before either stays
     assert edits.unread(opened(unread)[0], unread, unread) == unread
@@ -87,7 +87,7 @@ def test_ends_of_an_element_become_one_node_and_what_lies_between_goes():
     """c is spoken of by no one: b stays.  A second resistor beside the first has both ends there."""
     text = TEXT.replace("  C2:", "  R3: resistor(R = 3 ohm) c -> b\n  C2:")
     target, one = candidate(text, "R2", "R2: effort(e = 0 V) b -> c")
-    found = edits.merged(target, text, one)
+    found = edits.merge_nodes(target, text, one)
     assert lines(found)(text) == ["  node a, b: electrical", "  C2: capacitor(C = 2*C) b -> ground"]
     assert [line.split(":")[0].strip() for line in lines(text)(found)] == ["node a, b, c", "R2", "R3", "C2"]
 
@@ -95,10 +95,10 @@ def test_ends_of_an_element_become_one_node_and_what_lies_between_goes():
 def test_a_node_that_something_speaks_of_is_not_renamed():
     both = TEXT.replace("trace b.e", "trace b.e, c.e")
     target, one = candidate(both, "R2", "R2: effort(e = 0 V) b -> c")
-    assert edits.merged(target, both, one) is None
+    assert edits.merge_nodes(target, both, one) is None
     other = TEXT.replace("trace b.e", "trace c.e")  # then the other one goes
     target, one = candidate(other, "R2", "R2: effort(e = 0 V) b -> c")
-    found = edits.merged(target, other, one)
+    found = edits.merge_nodes(target, other, one)
     assert "  node a, c: electrical" in found
     assert "R1: resistor(R = R0) a -> c # in the way" in found
 
@@ -114,17 +114,17 @@ def test_a_node_that_something_speaks_of_is_not_renamed():
     ],
 )
 def test_a_line_of_which_nothing_is_left_goes(text, cut, left):
-    assert edits.changed(text, [(*cut, "")]) == left
+    assert edits.apply_cuts(text, [(*cut, "")]) == left
 
 
 def test_cuts_do_not_move_each_other():
-    assert edits.changed("one two three", [(0, 3, "1"), (4, 7, "2222"), (8, 13, "3")]) == "1 2222 3"
+    assert edits.apply_cuts("one two three", [(0, 3, "1"), (4, 7, "2222"), (8, 13, "3")]) == "1 2222 3"
 
 
 def test_statements_that_share_a_line_are_still_a_model():
     text = TEXT.replace("\n  C2: capacitor", "; C2: capacitor").replace("\n  init C2.e", "; init C2.e")
     target, one = candidate(text, "C2")
-    left = edits.without(target, text, one)
+    left = edits.remove_statement(target, text, one)
     report = Report()
     load.document(SourceText("m.sd", left), report)
     assert not [d for d in report if d.severity == "error"], left

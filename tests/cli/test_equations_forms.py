@@ -6,7 +6,7 @@ import re
 import pytest
 import sympy
 from printed_equations import SEED, Values, model, printed
-from sysdyn.cli.analysis.asked import compiled
+from sysdyn.cli.analysis.asked import compile_target
 from sysdyn.cli.main import run
 from sysdyn.cli.run.request.asked import Request
 from sysdyn.compiler.equations import matrices
@@ -119,7 +119,7 @@ def test_a_sine_inside_a_sine_is_left_where_it_is():
     t = sympy.Symbol("t")
     inner, angle = sympy.sin(t), 3 * t + sympy.sin(t)
     value = inner * sympy.sin(angle) ** 2 + inner * sympy.cos(angle) ** 2
-    assert matrices._turned(sympy, value) == inner
+    assert matrices._sines_by_cosines(sympy, value) == inner
 
 
 FAST = """\
@@ -165,7 +165,7 @@ def test_elements_have_their_state_functions_side_by_side(capsys):
 def test_a_law_that_is_not_linear_has_its_content_by_the_legendre_transform(capsys):
     """D + G = e f at the diode's law, dD/df = e and dG/de = f (Legendre), at numbers."""
     with ex.fresh():
-        _, prepared = compiled(Request(str(SEED / "diode_circuit.sd"), backend="numpy"), Report())
+        _, prepared = compile_target(Request(str(SEED / "diode_circuit.sd"), backend="numpy"), Report())
         found = {e.left[0].expression.data: e for e in elements(Algebra(Order()), prepared.network)}
         values = {ex.param("Is"): 0.3, ex.param("a"): 1.7, ex.param("e_diode"): 0.8}
         of = lambda name: evaluate(  # noqa: E731

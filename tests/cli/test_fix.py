@@ -5,7 +5,7 @@ import json
 import pytest
 from schema import CHECK, EDIT, conforms, envelope
 from sysdyn.cli.main import run
-from sysdyn.cli.run.check.mending import mended
+from sysdyn.cli.run.check.mending import mend
 from sysdyn.dsl.text import codes
 from sysdyn.dsl.text.diagnostics import SourceText
 
@@ -77,7 +77,7 @@ def test_what_has_a_choice_is_left(tmp_path, capsys):
 
 
 def test_a_mended_unit_may_bring_another_finding_to_light():
-    text, done = mended(SourceText("m.sd", "model m {\n  param k: N/m = 5 Nm\n}\n"))
+    text, done = mend(SourceText("m.sd", "model m {\n  param k: N/m = 5 Nm\n}\n"))
     assert "5 N.m" in text
     assert [d.code for d in done] == ["E201"]
 
@@ -89,10 +89,10 @@ def test_mending_never_adds_findings(code):
     page = codes.codes()[code]
     if len(page.bad) > 20_000:
         pytest.skip("a text at a limit")
-    assert mended(SourceText("m.sd", page.good))[0] == page.good
-    text, done = mended(SourceText("m.sd", page.bad))
+    assert mend(SourceText("m.sd", page.good))[0] == page.good
+    text, done = mend(SourceText("m.sd", page.bad))
     if done:
-        assert mended(SourceText("m.sd", text))[0] == text
+        assert mend(SourceText("m.sd", text))[0] == text
         assert code in {d.code for d in done}
 
 

@@ -282,7 +282,7 @@ def deadly(asked):
     """Kills its process at one golden, always."""
     if asked.golden.label == "pendulum/swing":
         os.kill(os.getpid(), signal.SIGKILL)
-    return jobs.checked(asked)
+    return jobs.check_golden(asked)
 
 
 def test_a_check_that_is_killed_costs_no_other(project):

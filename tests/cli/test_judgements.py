@@ -200,7 +200,7 @@ def powers(body):
     document = load.document(SourceText("m.sd", f"model m {{\n{body}\n}}\n"), report)
     network = load.network(document, document.models["m"], None, report)
     assert network is not None, [d.message for d in report]
-    return balance.observed(network)
+    return balance.add_observations(network)
 
 
 def worth(part, **values):

@@ -45,15 +45,15 @@ def last(text, **values):
 
 def test_unknowns_are_told_in_the_author_s_names_and_units():
     of, _ = last(ROD, **{**START, "y'": -4.0})
-    assert of.listed() == "x = 2 m, y = 0 m, x' = 0 m/s, y' = -4 m/s"
+    assert of.some_values() == "x = 2 m, y = 0 m, x' = 0 m/s, y' = -4 m/s"
 
 
 def test_what_has_grown_most_beyond_all_bounds_is_told():
     """A millionfold of where it was, or of one where it was less."""
     of, point = last(ROD, **{"x": 1e5, "y": 1e7, "x'": 5e6, "y'": 0.0})
-    assert of.grown(point(START)) == "y = 1e+07 m grows without bound"
+    assert of.unbounded_growth(point(START)) == "y = 1e+07 m grows without bound"
     of, point = last(ROD, **{"x": 1e5, "y": 1e5, "x'": 1e5, "y'": 0.0})
-    assert of.grown(point(START)) is None
+    assert of.unbounded_growth(point(START)) is None
 
 
 @pytest.mark.parametrize(("x", "told"), [(1e-7, True), (1e-3, False)])

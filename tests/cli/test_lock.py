@@ -86,10 +86,10 @@ def test_the_scene_wins(tmp_path, statement, how):
     path = Path(f"{file}.lock")
     from sysdyn.cli.run.request.asked import Request
     from sysdyn.cli.run.request.lock import hashes
-    from sysdyn.cli.run.request.targets import asked
+    from sysdyn.cli.run.request.targets import target_of
     from sysdyn.dsl.text.diagnostics import Report
 
-    now = hashes(asked(Request(file), Report()))["model.sd"]
+    now = hashes(target_of(Request(file), Report()))["model.sd"]
     before = tomllib.loads(path.read_text())["files"]["model.sd"]
     path.write_text(path.read_text().replace(before, now))
     assert ran(file)[:3] == how

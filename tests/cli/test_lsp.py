@@ -16,7 +16,7 @@ from sysdyn.cli.main import run
 from sysdyn.cli.run.request.targets import all_targets
 from sysdyn.dsl import load
 from sysdyn.dsl.model import expression as ex
-from sysdyn.dsl.parser.parse import expected
+from sysdyn.dsl.parser.parse import expected_words
 from sysdyn.dsl.text.diagnostics import Report
 from sysdyn.dsl.text.source import SourceText
 
@@ -481,7 +481,7 @@ def test_a_name_changed_everywhere_leaves_a_model_what_it_is(model):
     assert len(declared) > 10
     every = 1 if os.environ.get("SYSDYN_LONG") else 3
     for d in [*{d.place.span: d for d in declared}.values()][::every]:
-        changes = hover.renamed(document, d.place.span.start, "other_name")["changes"][document.uri]
+        changes = hover.rename_edits(document, d.place.span.start, "other_name")["changes"][document.uri]
         text = document.source.text
         for change in reversed(changes):
             start, end = (positions.offset(document.source, change["range"][side]) for side in ("start", "end"))
@@ -497,7 +497,7 @@ def test_a_name_changed_everywhere_leaves_a_model_what_it_is(model):
 
 def test_words_that_the_grammar_allows():
     def words(text):
-        return expected(SourceText("x", text))
+        return expected_words(SourceText("x", text))
 
     assert {"model", "component", "scene"} <= words("")
     assert "trace" not in words("")

@@ -12,7 +12,7 @@ from sysdyn.api import simulate
 from sysdyn.cli.main import run
 from sysdyn.cli.spice.model_text import Writer
 from sysdyn.cli.spice.reading import Reader
-from sysdyn.cli.spice.writing import formatted
+from sysdyn.cli.spice.writing import format_fast
 from sysdyn.dsl.format.format import format_text
 from sysdyn.dsl.text.diagnostics import Report
 from sysdyn.dsl.text.source import SourceText
@@ -286,7 +286,7 @@ def test_many_elements_take_work_in_proportion():
 
         sys.setprofile(count_them)
         try:
-            formatted(Writer(Reader(source, Report()).netlist, source, Report()).text())
+            format_fast(Writer(Reader(source, Report()).netlist, source, Report()).text())
         finally:
             sys.setprofile(None)
         return count
@@ -318,4 +318,4 @@ def test_the_layout_is_the_formatters(name):
     """Also of runs of plain statements, which go by it."""
     source, report = SourceText("n.cir", f"t\n{CIRCUITS[name][0]}"), Report()
     text = Writer(Reader(source, report).netlist, source, report).text()
-    assert formatted(text) == format_text(text)
+    assert format_fast(text) == format_text(text)

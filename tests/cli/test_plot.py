@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from sysdyn.cli.failures import UsageError
 from sysdyn.cli.main import run
-from sysdyn.cli.page.panels import curve, in_order, panels_of, shortened, styled, unit_text
+from sysdyn.cli.page.panels import abbreviate, curve, in_order, panels_of, styled_curves, unit_text
 from sysdyn.cli.page.sparkline import sparkline, told_apart
 from sysdyn.runtime.trace.trace import Quantity, Trace
 from texts import PENDULUM, write
@@ -177,10 +177,10 @@ def test_many_curves_of_a_panel_can_be_told_apart():
     assert names[:3] == ["x[1]", "x[2]", "x[3]"]
     (panel,) = panels_of([trace], names)
     for traces in ([("one", trace)], [("one", trace), ("two", trace)]):
-        drawn = [(colour, dashes) for *_, colour, dashes in styled(panel, traces)]
+        drawn = [(colour, dashes) for *_, colour, dashes in styled_curves(panel, traces)]
         assert len(set(drawn)) == len(drawn) == 14 * len(traces)
-    assert shortened("a" * 30 + "b" * 30, 12) == "aaaaaaa…bbbb"
-    assert shortened("short", 12) == "short"
+    assert abbreviate("a" * 30 + "b" * 30, 12) == "aaaaaaa…bbbb"
+    assert abbreviate("short", 12) == "short"
 
 
 def test_traces_in_other_units_share_an_axis():

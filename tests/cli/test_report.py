@@ -12,7 +12,7 @@ import pytest
 from pages import read
 from sysdyn.cli.equations.mathml import Typesetter, math, number
 from sysdyn.cli.main import run
-from sysdyn.cli.page.plots import thinned
+from sysdyn.cli.page.plots import thin
 from sysdyn.cli.report.layout import places
 from sysdyn.dsl.model import expression as ex
 from texts import ARRAY, BROKEN, FAILING, PENDULUM, ROOT, write
@@ -197,7 +197,7 @@ def test_thinned_curves_keep_spikes_and_gaps():
     time = np.linspace(0.0, 1.0, 100_001)
     values = np.zeros(time.size)
     values[12345], values[777] = 5.0, np.nan
-    few, kept = thinned(time, values, 500)
+    few, kept = thin(time, values, 500)
     assert few.size < 1600
     assert np.nanmax(kept) == 5.0
     assert np.isnan(kept).any()
@@ -303,8 +303,8 @@ def test_elements_of_a_model_with_events_have_their_energies(tmp_path, monkeypat
 def test_the_charge_of_an_element_is_no_letter_of_its_name():
     """C1 is q with C1 below, as `sysdyn equations` prints it; a coordinate q1 is its name."""
     types = Typesetter(["C1", "q1"], (), ["C1"])
-    assert types.unknown("C1", "q", 0) == "<msub><mi>q</mi><mi>C1</mi></msub>"
-    assert types.unknown("q1", "q", 0) == "<msub><mi>q</mi><mn>1</mn></msub>"
+    assert types.typeset_unknown("C1", "q", 0) == "<msub><mi>q</mi><mi>C1</mi></msub>"
+    assert types.typeset_unknown("q1", "q", 0) == "<msub><mi>q</mi><mn>1</mn></msub>"
 
 
 @pytest.mark.parametrize("restitution", [0.0, 0.5])

@@ -9,11 +9,11 @@ import sys
 import numpy as np
 import pytest
 from sysdyn.api import load
-from sysdyn.cli.equations.letters import Letter, is_letter, named
-from sysdyn.cli.golden.structures import changed
+from sysdyn.cli.equations.letters import Letter, is_letter, letter_of_name
+from sysdyn.cli.golden.structures import describe_change
 from sysdyn.cli.main import run
 from sysdyn.cli.page import curves
-from sysdyn.cli.page.source_text import block, highlighted
+from sysdyn.cli.page.source_text import block, highlight
 from sysdyn.cli.progress import ProgressLine
 from sysdyn.cli.report.text import section
 from sysdyn.cli.run import module_check
@@ -48,20 +48,20 @@ from sysdyn.values import dataclass
 )
 @pytest.mark.one_in(5)
 def test_names_are_letters_where_they_are_one(text, letter, one):
-    assert named(text) == letter
+    assert letter_of_name(text) == letter
     assert is_letter(text) == one
 
 
 def test_a_rate_has_dots():
-    assert named("x", 2).dots == 2
+    assert letter_of_name("x", 2).dots == 2
 
 
 def test_words_numbers_texts_and_comments_are_marked():
-    assert highlighted('param m = 1.5e3 "a<b" # 2 kg') == (
+    assert highlight('param m = 1.5e3 "a<b" # 2 kg') == (
         '<span class="w">param</span> m = <span class="n">1.5e3</span> '
         '<span class="s">&quot;a&lt;b&quot;</span> <span class="c"># 2 kg</span>'
     )
-    assert highlighted("parameter x1") == "parameter x1"  # no word of the language, no number
+    assert highlight("parameter x1") == "parameter x1"  # no word of the language, no number
     assert block("model a\n\n").count("\n") == 0
 
 
@@ -83,14 +83,14 @@ def test_ticks_are_round_and_tell_each_other_apart():
 
 
 def test_a_frame_leaves_a_margin_and_maps_its_corners():
-    frame = curves.framed(0.0, 4.0, [np.array([0.0, 1.0])])
+    frame = curves.frame_around(0.0, 4.0, [np.array([0.0, 1.0])])
     assert (frame.bottom, frame.top) == (-0.05, 1.05)
     assert frame.across(0.0) == curves.LEFT
     assert frame.across(4.0) == curves.WIDTH - curves.RIGHT
-    assert frame.down(frame.top) == curves.TOP
-    assert frame.down(frame.bottom) == curves.HEIGHT - curves.BOTTOM
-    assert curves.framed(0.0, 0.0, [np.ones(2)]) is None
-    flat = curves.framed(0.0, 1.0, [np.zeros(2)])
+    assert frame.y_pixels(frame.top) == curves.TOP
+    assert frame.y_pixels(frame.bottom) == curves.HEIGHT - curves.BOTTOM
+    assert curves.frame_around(0.0, 0.0, [np.ones(2)]) is None
+    flat = curves.frame_around(0.0, 1.0, [np.zeros(2)])
     assert (flat.bottom, flat.top) == (-1.0, 1.0)
 
 
@@ -154,12 +154,12 @@ COUNTS = {
 def test_work_counts_steps_entries_and_rows():
     """3 unknowns, 7 entries; steps that were refused count, rows cost more where constraints bend."""
     size, bent = work.Size(3, 7, bent=False), work.Size(3, 7, bent=True)
-    assert work.counted(COUNTS, size, "bdf") == 12 * (369.0 + 3 * 3.2) + 7 * 2.58 * COUNTS["residual_evaluations"]
+    assert work.work_of_steps(COUNTS, size, "bdf") == 12 * (369.0 + 3 * 3.2) + 7 * 2.58 * COUNTS["residual_evaluations"]
     matrices = COUNTS["jacobian_evaluations"] + COUNTS["factorisations"]
     evaluated = 3.85 * COUNTS["residual_evaluations"] + 31.9 * matrices
-    assert work.counted(COUNTS, size, "radau") == pytest.approx(12 * 3 * 8.8 + 7 * evaluated)
-    assert work.fixed(100, size, "radau") == pytest.approx(105000.0 + 100 * (293.0 + 12.6 * 7))
-    assert work.fixed(100, bent, "radau") == pytest.approx(105000.0 + 100 * (293.0 + 71.0 * 7))
+    assert work.work_of_steps(COUNTS, size, "radau") == pytest.approx(12 * 3 * 8.8 + 7 * evaluated)
+    assert work.work_of_rows(100, size, "radau") == pytest.approx(105000.0 + 100 * (293.0 + 12.6 * 7))
+    assert work.work_of_rows(100, bent, "radau") == pytest.approx(105000.0 + 100 * (293.0 + 71.0 * 7))
     assert work.step(size, "radau") == pytest.approx(3 * 8.8 + 7 * 3.85)
 
 
@@ -184,10 +184,10 @@ def test_events_that_are_apart_are_an_error():
 
 
 def test_what_changed_in_a_structure_is_told_by_its_first_lines():
-    assert changed("index", 1, 3) == "index is 3, recorded 1"
-    assert changed("rows", ["a", "b"], ["b", "a"]) == "rows are in another order"
-    assert changed("rows", ["a", "b"], ["b", "c", "d"]) == "rows: 'c' is new, 'a' is gone and 1 more"
-    assert changed("rows", [["a", 1]], []) == "rows: 'a 1' is gone"
+    assert describe_change("index", 1, 3) == "index is 3, recorded 1"
+    assert describe_change("rows", ["a", "b"], ["b", "a"]) == "rows are in another order"
+    assert describe_change("rows", ["a", "b"], ["b", "c", "d"]) == "rows: 'c' is new, 'a' is gone and 1 more"
+    assert describe_change("rows", [["a", 1]], []) == "rows: 'a 1' is gone"
 
 
 def test_a_closed_stream_is_an_error_when_something_is_said(monkeypatch):
@@ -221,7 +221,7 @@ def test_pages_are_kept_where_the_process_ends_with_its_command(monkeypatch):
 
     monkeypatch.setattr(ctypes, "CDLL", lambda _: Library)
     for kept in (False, True):
-        monkeypatch.setattr(memory, "kept", lambda kept=kept: kept)
+        monkeypatch.setattr(memory, "is_keeping", lambda kept=kept: kept)
         memory.keep_pages()
     assert asked == [(-1, -1), (-4, 0)]  # M_TRIM_THRESHOLD, M_MMAP_MAX of malloc.h
 
@@ -297,8 +297,8 @@ def test_numbers_of_a_few_digits_are_no_fault_of_a_module():
     found = np.array([[137.0 * least, 1.0 + 3e-9, 3e-300 * (1.0 + 1e-8), least]])
     still, fast = (Points(np.zeros(1), np.ones((1, 1)), np.full((1, 1), rate)) for rate in (0.0, 1e162))
     sample = Sample(rows, said, np.abs(said))
-    assert module_check._apart(found, sample, still).tolist() == [[False, True, True, False]]
-    assert module_check._apart(found, sample, fast).tolist() == [[False, True, False, False]]
+    assert module_check._differing_points(found, sample, still).tolist() == [[False, True, True, False]]
+    assert module_check._differing_points(found, sample, fast).tolist() == [[False, True, False, False]]
 
 
 def test_a_start_that_no_point_gives_numbers_for_says_what_helps(tmp_path):

@@ -5,7 +5,7 @@ from types import SimpleNamespace
 import pytest
 from sysdyn.cli.failures import UsageError
 from sysdyn.cli.memory_limit import LEAST, TooLittle
-from sysdyn.cli.page.columns import aligned, fitted
+from sysdyn.cli.page.columns import align, fit_columns
 from sysdyn.cli.page.named import destination, label, quantities
 
 
@@ -46,8 +46,8 @@ def test_quantities_are_those_asked_for_each_once_and_meters_by_either_spelling(
 
 def test_a_table_leaves_out_what_a_terminal_has_no_room_for():
     rows = [["", "name", "work", "drift", ""], [">", "radau", "1.2e6", "1e-12", "chosen"]]
-    assert fitted(rows, ("drift", "work"), None) == (rows, "")
-    assert fitted(rows, ("drift", "work"), 30) == (rows, "")
-    assert fitted(rows, ("drift", "work"), 29)[0] == [["", "name", "work", ""], [">", "radau", "1.2e6", "chosen"]]
-    assert fitted(rows, ("drift", "work"), 10)[1] == "10 columns have no room for drift; work"
-    assert max(map(len, aligned(rows).split("\n"))) == 30
+    assert fit_columns(rows, ("drift", "work"), None) == (rows, "")
+    assert fit_columns(rows, ("drift", "work"), 30) == (rows, "")
+    assert fit_columns(rows, ("drift", "work"), 29)[0] == [["", "name", "work", ""], [">", "radau", "1.2e6", "chosen"]]
+    assert fit_columns(rows, ("drift", "work"), 10)[1] == "10 columns have no room for drift; work"
+    assert max(map(len, align(rows).split("\n"))) == 30

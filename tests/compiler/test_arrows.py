@@ -6,11 +6,11 @@ from catalogue import ONE, PLACE
 from networks import ELECTRICAL, TRANSLATION, Net, compiled, matched, of, poles
 from sysdyn.compiler.network.along import along
 from sysdyn.compiler.network.dead_branches import dead_branches
-from sysdyn.compiler.network.influence import links, reached
+from sysdyn.compiler.network.influence import influences_on, links
 from sysdyn.compiler.network.quadratures import massive
-from sysdyn.compiler.network.skeleton import filled, shaped
+from sysdyn.compiler.network.skeleton import fill_shape, shape_of
 from sysdyn.compiler.network.stated import ALL, as_elements
-from sysdyn.compiler.network.ungrounded import grounded
+from sysdyn.compiler.network.ungrounded import add_references
 from sysdyn.dsl.model import expression as x
 from sysdyn.dsl.model.evaluation import evaluate
 from sysdyn.dsl.model.network import Dynamic, Energy, State
@@ -147,7 +147,7 @@ def test_each_part_without_a_ground_gets_one_reference():
     for name, *pair in (("1", "a", "b"), ("2", "b", "c"), ("3", "c", "a"), ("4", "d", "e"), ("5", "d", "e")):
         net.C(name, 1.0, *pair)
     net.C("6", 1.0, "e")  # d and e reach the ground
-    found = grounded(net.network()).constraints
+    found = add_references(net.network()).constraints
     assert [(c.kind, c.name.rpartition(".")[2]) for c in found] == [("psi", "reference")]
     assert found[0].name[0] in "abc"
 
@@ -158,7 +158,7 @@ def test_a_part_that_counts_from_another_node_than_its_ground_needs_none():
         net.node(name, ELECTRICAL)
     for name, *pair in (("1", "a", "b"), ("2", "b", "c"), ("3", "b"), ("4", "b")):
         net.C(name, 1.0, *pair)
-    assert not grounded(net.network()).constraints
+    assert not add_references(net.network()).constraints
 
 
 def test_a_mass_on_each_point_of_a_family():
@@ -206,10 +206,10 @@ def test_what_is_read_influences_and_is_not_influenced():
     )
     found = links(network)
     first = {("n", "a"), ("b", "R"), ("b", "C")}
-    assert reached(found, frozenset({("n", "a")})) == first
-    assert reached(found, frozenset({("s", "s")})) == first | {("s", "s")}
+    assert influences_on(found, frozenset({("n", "a")})) == first
+    assert influences_on(found, frozenset({("s", "s")})) == first | {("s", "s")}
     every = first | {("s", "s"), ("n", "b"), ("b", "source"), ("b", "load")}
-    assert reached(found, frozenset({("n", "b")})) == every
+    assert influences_on(found, frozenset({("n", "b")})) == every
 
 
 # -- laws with holes ----------------------------------------------------------------------------------------
@@ -221,11 +221,11 @@ def law(name, first, second):
 
 
 def test_laws_that_differ_in_numbers_have_one_shape():
-    one, other = shaped(law("r1", 3.0, 0.5), "r1"), shaped(law("r2", 4.0, 0.7), "r2")
+    one, other = shape_of(law("r1", 3.0, 0.5), "r1"), shape_of(law("r2", 4.0, 0.7), "r2")
     assert one.key == other.key
     assert [h.data for h in one.holes] != [h.data for h in other.holes]
-    assert filled(one, "r2", (), other.holes) is law("r2", 4.0, 0.7)
-    own = filled(one, "r", (x.const(4.0),), one.holes)
+    assert fill_shape(one, "r2", (), other.holes) is law("r2", 4.0, 0.7)
+    own = fill_shape(one, "r", (x.const(4.0),), one.holes)
     assert {n.args for n in x.variables(own)} == {(x.const(4.0),)}
     assert value(own, **{"r.bf": 2.0}) == pytest.approx(1.0 + 3.0 * 2.0 + 2.0 * 2.718281828459045)
 
@@ -233,7 +233,7 @@ def test_laws_that_differ_in_numbers_have_one_shape():
 def test_laws_of_other_functions_have_another_shape():
     f = of("r", "bf")
     shapes = [x.call("exp", f), x.call("sin", f), x.mul(f, f), x.power(f, x.const(3.0)), of("r", "be")]
-    keys = {shaped(x.scale(2.0, node), "r").key for node in shapes}
+    keys = {shape_of(x.scale(2.0, node), "r").key for node in shapes}
     assert len(keys) == len(shapes)
-    assert shaped(of("other", "bf"), "r") is None
-    assert shaped(x.call("abs", f), "r") is None
+    assert shape_of(of("other", "bf"), "r") is None
+    assert shape_of(x.call("abs", f), "r") is None

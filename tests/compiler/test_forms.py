@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 from sysdyn.cli.commands.model.compile_command import STAGES
 from sysdyn.cli.main import run
-from sysdyn.compiler.network.reflection import relabelled
+from sysdyn.compiler.network.reflection import relabel
 from sysdyn.compiler.network.verify import BrokenNetworkError, verify_network
 from sysdyn.compiler.pipeline import compile_network
 from sysdyn.dsl import load
@@ -63,8 +63,8 @@ TWICE = ("seed/lead_filter", "seed/dc_motor", "seed/mechanical_gyrator", "galler
 def test_the_other_letters_twice_are_the_letters_themselves(model):
     with ex.fresh():
         network = network_of(model)
-        assert relabelled(relabelled(network)) == network
-        assert show(relabelled(network)) != show(network)
+        assert relabel(relabel(network)) == network
+        assert show(relabel(network)) != show(network)
 
 
 def test_nothing_of_nodes_and_branches_is_left_in_coordinates():

@@ -10,12 +10,12 @@ from sysdyn.compiler.network.primal.bounds import (
     Affine,
     Interval,
     Sizes,
+    box_difference,
     box_size,
-    joined,
+    box_union,
     number,
     parts,
     union,
-    without,
 )
 from sysdyn.compiler.network.primal.cycles import in_loops
 from sysdyn.compiler.network.primal.incidence import elements
@@ -56,16 +56,16 @@ def test_what_is_left_of_a_box_around_a_hole(seed):
     random = np.random.default_rng(seed)
     whole = random_box(random, int(random.integers(1, 4)))
     hole = random_box(random, len(whole), whole)
-    left = list(without(whole, hole))
+    left = list(box_difference(whole, hole))
     assert sum(map(box_size, left)) == box_size(whole) - box_size(hole)
     assert set().union(*map(inside, left)) == inside(whole) - inside(hole)
     assert [plain(b) for b in union([*left, hole])] == [plain(whole)]
 
 
 def test_boxes_that_do_not_make_one():
-    assert joined(box((1, 2)), box((4, 5))) is None
-    assert joined(box((1, 2), (1, 3)), box((3, 4), (1, 2))) is None
-    assert plain(joined(box((3, 4), (1, 2)), box((1, 2), (1, 2)))) == [(1, 4), (1, 2)]
+    assert box_union(box((1, 2)), box((4, 5))) is None
+    assert box_union(box((1, 2), (1, 3)), box((3, 4), (1, 2))) is None
+    assert plain(box_union(box((3, 4), (1, 2)), box((1, 2), (1, 2)))) == [(1, 4), (1, 2)]
 
 
 def test_parts_have_names_of_their_own():
@@ -101,7 +101,7 @@ def classes_of(found, items):
     for item in range(len(items)):
         for cell in found.cells(item):
             root, _ = found.find(cell)
-            open_ = found.extended(cell)
+            open_ = found.free_dimensions(cell)
             for at in inside(found.box(cell)):
                 along = [(axis, at[d] + found.axis(item, d)[1].value) for d, axis, _ in open_]
                 of[item, at] = root, frozenset(along)
@@ -163,7 +163,7 @@ def test_a_run_is_one_class_and_its_far_end_another():
     found = IndexClasses([box((1, 9))], [Link(box((3, 5)), *ends)])
     assert not found.refused
     assert sorted(plain(found.box(c))[0] for c in found.cells(0)) == [(1, 2), (3, 6), (7, 9)]
-    assert [bool(found.extended(c)) for c in found.cells(0)] == [True, False, True]
+    assert [bool(found.free_dimensions(c)) for c in found.cells(0)] == [True, False, True]
 
 
 def test_items_that_lie_beside_each_other_are_moved_onto_one_axis():

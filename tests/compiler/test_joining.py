@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 from sysdyn.compiler.equations.algebra import Algebra
-from sysdyn.compiler.equations.joining import joined, shorter, shortest
+from sysdyn.compiler.equations.joining import collect_terms, shorter, shortest
 from sysdyn.compiler.equations.order import Order
 from sysdyn.dsl.model import expression as x
 from sysdyn.dsl.model.evaluation import evaluate
@@ -36,7 +36,7 @@ def texts(terms):
 def test_inertias_of_one_rate_are_one():
     m, l, j, a, _, _, rate, _ = leaves()
     root = x.add(x.mul(m, l, l, rate), x.mul(j, rate), x.mul(m, x.param("g"), l, x.call("sin", a)))
-    first, rest = joined(algebra(), root)
+    first, rest = collect_terms(algebra(), root)
     assert x.variables(rest) >= {a}
     assert rate in x.variables(first)
     assert value(first, {m: 2.0, l: 3.0, j: 5.0, rate: 1.0}) == 23.0
@@ -47,13 +47,13 @@ def test_inertias_of_one_rate_are_one():
 def test_squares_of_sine_and_cosine_are_one():
     m, _, _, a, _, _, rate, _ = leaves()
     squares = x.add(x.power(x.call("sin", a), x.const(2.0)), x.power(x.call("cos", a), x.const(2.0)))
-    assert texts(joined(algebra(), x.mul(m, squares, rate))) == ["m*a''"]
+    assert texts(collect_terms(algebra(), x.mul(m, squares, rate))) == ["m*a''"]
 
 
 def test_rates_come_first_then_multipliers_then_flows():
     m, l, _, a, f, other, rate, kappa = leaves()
     root = x.add(x.mul(l, f), x.mul(m, x.sub(rate, rate)), x.mul(m, kappa), x.mul(l, rate), x.mul(a, f, other), a)
-    found = joined(algebra(), root)
+    found = collect_terms(algebra(), root)
     assert [sorted(n.data[1:] for n in x.variables(t) if n.op == "var") for t in found] == [
         [("f", 1)], [("kappa", 0)], [("f", 0), ("f", 0), ("q", 0)], [("f", 0)], [("q", 0)],
     ]  # fmt: skip
@@ -61,8 +61,8 @@ def test_rates_come_first_then_multipliers_then_flows():
 
 def test_what_cancels_is_gone():
     m, _, _, a, f, *_ = leaves()
-    assert joined(algebra(), x.sub(x.mul(x.add(m, a), f), x.add(x.mul(m, f), x.mul(a, f)))) == ()
-    assert joined(algebra(), x.const(0.0)) == ()
+    assert collect_terms(algebra(), x.sub(x.mul(x.add(m, a), f), x.add(x.mul(m, f), x.mul(a, f)))) == ()
+    assert collect_terms(algebra(), x.const(0.0)) == ()
 
 
 CALLS = ["sin", "cos", "tan", "exp", "atan", "sinh", "cosh", "tanh", "abs", "sign"]
@@ -83,7 +83,7 @@ def random_expression(random, depth, own):
             return x.call(str(random.choice(CALLS)), one)
 
 
-@pytest.mark.parametrize("arrow", [joined, shorter])
+@pytest.mark.parametrize("arrow", [collect_terms, shorter])
 @pytest.mark.parametrize("seed", range(40))
 @pytest.mark.one_in(5)
 def test_the_terms_are_worth_what_was_joined(seed, arrow):

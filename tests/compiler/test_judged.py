@@ -19,7 +19,7 @@ from sysdyn.compiler.network.primal.bounds import Sizes
 from sysdyn.compiler.network.primal.contents import Contents
 from sysdyn.compiler.network.primal.incidence import Incidence
 from sysdyn.compiler.network.primal.reading import EliminationTable, IndexBox, Rewriter, touches_network
-from sysdyn.compiler.network.primal.unspecified import measured
+from sysdyn.compiler.network.primal.unspecified import guess_contents
 from sysdyn.compiler.pipeline import compile_network
 from sysdyn.compiler.program.rolled import skeleton
 from sysdyn.dsl.model import expression as x
@@ -236,7 +236,7 @@ def guesses(net, *initials):
     momenta = {e.number: e.branch.law for e in elements if e.branch.kind == "kinetic"}
     reader = Rewriter(sizes, EliminationTable(pieces, {}, momenta, lambda *_: x.const(0.0)))
     assert Contents(reader, (), initials, elements, reflected=False).parameters == []
-    found, stores = measured(network, set(), initials, sizes, reader, reflected=False)
+    found, stores = guess_contents(network, set(), initials, sizes, reader, reflected=False)
     return {i.store: (i.said, i.value.data) for i in found}, stores
 
 

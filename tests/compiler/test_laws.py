@@ -170,5 +170,5 @@ def span(node):
 
 def test_a_node_that_touches_nothing_has_no_effort():
     with pytest.raises(ModelError) as error:
-        Potentials(()).known(SimpleNamespace(place=PLACE), "lonely", (), {})
+        Potentials(()).effort_of_node(SimpleNamespace(place=PLACE), "lonely", (), {})
     assert [d.code for d in error.value.diagnostics] == ["E409"]

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from catalogue import convert, names_of, network
 from reference_values import load
-from sysdyn.compiler.forms.legendre import COUPLED, transformed
+from sysdyn.compiler.forms.legendre import COUPLED, legendre_transform
 from sysdyn.compiler.model.energies import energies
 from sysdyn.compiler.pipeline import compile_network
 from sysdyn.dsl import load as dsl
@@ -23,7 +23,7 @@ def lowered(key, k, changes=()):
     entry = CATALOGUE[key]
     entry = {**entry, "parameters": entry["parameters"] | dict(changes)}
     net = network(entry, entry["models"][k])
-    return entry, net, transformed(energies(net), net.parameters)[0]
+    return entry, net, legendre_transform(energies(net), net.parameters)[0]
 
 
 def test_what_is_transformed():
@@ -175,7 +175,7 @@ def test_an_inertia_that_a_binding_makes_singular_is_guarded(tmp_path):
     """The pivots of M at some point must not become zero with the values of parameters: m = 0."""
     with x.fresh():
         net = pendulums(tmp_path, 3)
-        _, rests = transformed(energies(net), net.parameters)
+        _, rests = legendre_transform(energies(net), net.parameters)
         assert [r.name for r in rests] == ["a0", "a1", "a2"]
         at = {x.param("m"): 1.0, x.param("l"): 0.5}
         assert all(value != 0.0 for value in evaluate([r.expression for r in rests], at.__getitem__))

@@ -4,7 +4,7 @@ import pytest
 from catalogue import PLACE
 from chains import blank
 from sysdyn.compiler.network.primal.bounds import Sizes
-from sysdyn.compiler.network.primal.overlaps import initially, meeting, narrowed, ranges_of, untold
+from sysdyn.compiler.network.primal.overlaps import initially, meeting, ranges_of, restrict_loops, untold
 from sysdyn.dsl.model import expression as x
 from sysdyn.dsl.model.evaluation import evaluate
 from sysdyn.dsl.model.network import Initial, Loop
@@ -41,7 +41,7 @@ def test_the_part_that_two_ranges_share_is_a_loop_of_its_own():
     sizes, loops = Sizes(blank()), [over("k", 0, 9)]
     i, k = x.index("i"), x.index("k")
     found, value = meeting(said([i], i, over("i", 3, 50)), [k], ranges_of(loops, sizes, PLACE), sizes)
-    (loop,) = narrowed(loops, found)
+    (loop,) = restrict_loops(loops, found)
     assert (loop.index, loop.first, loop.last, value) == ("k", x.const(3), x.const(9), k)
 
 

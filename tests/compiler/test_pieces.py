@@ -15,7 +15,7 @@ from sysdyn.compiler.forms.meters.observing import Equation, add_initials, missi
 from sysdyn.compiler.forms.meters.untraced import MOST, with_coordinates_observed
 from sysdyn.compiler.model.energies import EnergyModel, Family, Row, Target, energies
 from sysdyn.compiler.model.terms import Term
-from sysdyn.compiler.network.authors import owner, shown, told
+from sysdyn.compiler.network.authors import in_author_names, owner, split_finding
 from sysdyn.compiler.network.primal import primal
 from sysdyn.compiler.network.primal.account import Step
 from sysdyn.compiler.program.formulas import canonical
@@ -245,7 +245,7 @@ OWN = {"R#": tuple((name, PLACE) for name in ("r1", "load", "r3"))}
     ],
 )
 def test_elements_of_gathered_families_are_called_as_the_author_did(text, said):
-    assert shown(text, OWN) == said
+    assert in_author_names(text, OWN) == said
 
 
 def test_who_a_name_belongs_to():
@@ -253,7 +253,7 @@ def test_who_a_name_belongs_to():
 
 
 def test_a_finding_about_a_family_is_one_about_each_element():
-    found = told(Diagnostic("E313", "R#[i] follows R#[i - 1] for i in 1..2", PLACE), OWN)
+    found = split_finding(Diagnostic("E313", "R#[i] follows R#[i - 1] for i in 1..2", PLACE), OWN)
     assert [d.message for d in found] == ["load follows r1", "r3 follows load"]
     plain = Diagnostic("E313", "load", PLACE)
-    assert list(told(plain, OWN)) == [plain]
+    assert list(split_finding(plain, OWN)) == [plain]

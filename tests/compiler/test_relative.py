@@ -3,7 +3,7 @@
 import pytest
 from catalogue import ONE, PLACE
 from chains import blank, coordinate
-from sysdyn.compiler.forms.conjugates import signed
+from sysdyn.compiler.forms.conjugates import negate_conjugates
 from sysdyn.compiler.forms.relative_coordinates import in_relative_coordinates, without_ignorable
 from sysdyn.compiler.forms.series_stores import with_efforts_of_stores
 from sysdyn.compiler.model.energies import energies
@@ -127,6 +127,6 @@ def test_a_law_reads_the_store_in_series_with_what_it_is_of():
 def test_the_book_s_sign_of_a_conjugate():
     """Every p changes its sign, its rate too: p q - p' becomes p' - p q."""
     p, rate = x.var("a", "p"), x.var("a", "p", order=1)
-    assert signed(x.sub(x.mul(p, q("a")), rate)) is x.sub(rate, x.mul(p, q("a")))
-    assert signed(x.mul(p, p)) is x.mul(p, p)
-    assert signed(q("a")) is q("a")
+    assert negate_conjugates(x.sub(x.mul(p, q("a")), rate)) is x.sub(rate, x.mul(p, q("a")))
+    assert negate_conjugates(x.mul(p, p)) is x.mul(p, p)
+    assert negate_conjugates(q("a")) is q("a")

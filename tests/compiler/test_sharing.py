@@ -6,7 +6,7 @@ import random
 import pytest
 from sysdyn.compiler.model.integers import Reference
 from sysdyn.compiler.program.program import Assign, Fold, Routine, Store
-from sysdyn.compiler.program.sharing import shared
+from sysdyn.compiler.program.sharing import share_operations
 
 UNKNOWNS = 5
 
@@ -74,7 +74,7 @@ def test_values_are_the_same_but_for_round_off(seed):
     given = routine(random_body(seed))
     rng = random.Random(100 + seed)
     y = [rng.uniform(0.5, 1.5) for _ in range(UNKNOWNS)]
-    wanted, found = values(given, y), values(shared(given), y)
+    wanted, found = values(given, y), values(share_operations(given), y)
     assert wanted.keys() == found.keys()
     for place, value in wanted.items():
         if abs(value) < 1e6:  # sines of larger numbers show their round-off
@@ -84,7 +84,7 @@ def test_values_are_the_same_but_for_round_off(seed):
 def test_a_product_within_two_products_is_made_once():
     body = [*read(4), Assign(4, "mul", (1.0, 1.0, 1.0), (0, 1, 2)), Assign(5, "mul", (1.0, 2.0, 1.0), (0, 1, 3))]
     given = routine([*body, Store(0, 4), Store(1, 5)])
-    made = shared(given)
+    made = share_operations(given)
     assert operations(given) == 5
     assert operations(made) == 4
     y = [1.1, 1.3, 1.7, 1.9]
@@ -95,7 +95,7 @@ def test_what_differs_by_a_sign_or_a_power_of_two_is_one_value_to_the_last_bit()
     signs = [Assign(4, "sum", (0.0, (-1.0, -1.0)), (0, 1)), Assign(5, "sum", (0.0, (2.0, 2.0)), (0, 1))]
     products = [Assign(6, "mul", (1.0, 1.0), (4, 2)), Assign(7, "mul", (1.0, 1.0), (5, 2))]
     given = routine([*read(4), *signs, *products, *(Store(k, 4 + k) for k in range(4))])
-    made = shared(given)
+    made = share_operations(given)
     y = [0.1, 0.7, 1.3, 0.0]
     assert values(made, y) == values(given, y)
     assert operations(made) == 1
@@ -106,11 +106,11 @@ def test_what_folds_read_keeps_its_number():
     inner = Assign(3, "mul", (1.0, 1.0), (1, 1))
     fold = Fold(2, "sum", 0, None, None, (inner,), 3)
     place = Reference(0, (), -1, ())
-    made = shared(routine([*read(1), double, fold, Store(place, 2)]))
+    made = share_operations(routine([*read(1), double, fold, Store(place, 2)]))
     assert [s.target for s in made.body if isinstance(s, Assign)] == [0, 1]
     assert fold in made.body
 
 
 def test_what_nobody_reads_is_left_out():
-    made = shared(routine([*read(2), Assign(2, "mul", (1.0, 1.0), (0, 1)), Store(0, 1)]))
+    made = share_operations(routine([*read(2), Assign(2, "mul", (1.0, 1.0), (0, 1)), Store(0, 1)]))
     assert [s.target for s in made.body if isinstance(s, Assign)] == [1]

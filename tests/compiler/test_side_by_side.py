@@ -94,9 +94,9 @@ def test_a_strand_runs_through_nodes_that_two_branches_touch_alone():
 def test_a_strand_the_other_way_round_is_the_same():
     found = strands(*star(10), set())
     strand = max(found.classes, key=lambda one: len(one[0].branches))[0]
-    assert strand.reversed().reversed() == strand
-    assert strand.reversed().nodes == strand.nodes[::-1]
-    assert [sense for _, sense in strand.reversed().branches] == [not sense for _, sense in reversed(strand.branches)]
+    assert strand.reverse().reverse() == strand
+    assert strand.reverse().nodes == strand.nodes[::-1]
+    assert [sense for _, sense in strand.reverse().branches] == [not sense for _, sense in reversed(strand.branches)]
 
 
 def test_strands_in_other_senses_are_other_classes():

@@ -7,7 +7,7 @@ import pytest
 from catalogue import PLACE
 from chains import blank, parameter
 from sysdyn.compiler.binding.counts import match
-from sysdyn.compiler.forms.conjugates import signed, with_book_signs
+from sysdyn.compiler.forms.conjugates import negate_conjugates, with_book_signs
 from sysdyn.compiler.forms.coverage import bind_covers, inside, outside
 from sysdyn.compiler.forms.descriptor import Block, DescriptorForm, Equations, Kernel, Pin, Summand, Unknowns
 from sysdyn.compiler.model.energies import Family
@@ -211,7 +211,7 @@ def test_conjugates_of_complementary_forms_have_the_books_sign():
     assert [pin.value.data for pin in found.pins] == [5.0, -5.0]
     primal = book("hamiltonian")
     assert with_book_signs(primal) is primal
-    assert signed(f) is f
+    assert negate_conjugates(f) is f
 
 
 @pytest.mark.parametrize(
@@ -258,8 +258,8 @@ def test_an_index_from_a_table_of_the_compiler():
     assert (found.loop, found.offset.value) == (None, 4)
     reached = [found.over({"i": Interval(number(a), number(b))}) for a, b in ((0, 2), (0, 1), (1, 1))]
     assert [(r.first.value, r.last.value) for r in reached] == [(2, 9), (2, 4), (2, 2)]
-    assert found.at({"i": x.const(2.0)}) is x.const(9)
-    assert found.at({"i": x.index("#0")}) is x.param("#t", x.index("#0"))
+    assert found.substitute_loops({"i": x.const(2.0)}) is x.const(9)
+    assert found.substitute_loops({"i": x.index("#0")}) is x.param("#t", x.index("#0"))
 
 
 @pytest.mark.parametrize("seed", range(6))

@@ -4,7 +4,7 @@ import math
 
 import numpy as np
 import pytest
-from sysdyn.compiler.forms.corners.turning import NEAR, RISEN, compared, rising, turning
+from sysdyn.compiler.forms.corners.turning import NEAR, RISEN, rising, turning, turns_in_conditions
 from sysdyn.dsl.model import expression as ex
 from sysdyn.dsl.model.evaluation import evaluate
 
@@ -48,7 +48,7 @@ def test_whole_numbers_are_met_from_both_sides():
     one, other = (z[0] for z in (zeros(n, 0.9, 1.1) for n in turning(node)))
     assert abs(abs(one - other) - 2.0 * NEAR / math.pi) < 1e-12
     assert 0.5 * (one + other) == pytest.approx(1.0, abs=1e-12)
-    assert len([*compared(ex.compare("<", node, ex.const(2.0)))]) == 2
+    assert len([*turns_in_conditions(ex.compare("<", node, ex.const(2.0)))]) == 2
 
 
 def test_of_what_rises_at_once_two_make_a_moment_and_one_does_not():

@@ -2,7 +2,7 @@
 
 import pytest
 from sysdyn import api
-from sysdyn.dsl.model.unit_habits import cased, respelled
+from sysdyn.dsl.model.unit_habits import case_variants, correct_spelling
 
 MODEL = """model m {{
   node x: translation = 0.1 m
@@ -52,11 +52,11 @@ def test_a_claim_that_allows_less_than_nothing():
 
 
 def test_letters_in_the_wrong_case():
-    assert cased("pa") == ["Pa", "pA"]
-    assert respelled("pa") is None
+    assert case_variants("pa") == ["Pa", "pA"]
+    assert correct_spelling("pa") is None
     meant = {"hz": "Hz", "RPM": "rpm", "KN": "kN", "Kg": "kg", "PA": "Pa", "kpa": "kPa"}
-    assert {wrong: respelled(wrong) for wrong in meant} == meant
-    assert respelled("mhz") is None
+    assert {wrong: correct_spelling(wrong) for wrong in meant} == meant
+    assert correct_spelling("mhz") is None
 
 
 @pytest.mark.parametrize(

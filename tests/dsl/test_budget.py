@@ -7,7 +7,7 @@ from sysdyn.dsl import load
 from sysdyn.dsl.model import budget
 from sysdyn.dsl.model import expression as ex
 from sysdyn.dsl.names.resolve import Resolver
-from sysdyn.dsl.text.diagnostics import MOST, Diagnostic, Report, SourceText, shortened
+from sysdyn.dsl.text.diagnostics import MOST, Diagnostic, Report, SourceText, limit_findings
 
 MODEL = """{head}model m {{
   param m = 2 kg
@@ -143,7 +143,7 @@ def test_the_stages_after_the_front_end_draw_on_it_too(monkeypatch):
     from sysdyn.dsl.text.diagnostics import ModelError
 
     network, _ = judged("  energy V = 1 N*x")
-    monkeypatch.setattr(budget, "granted", lambda: 3 * budget.NODE)
+    monkeypatch.setattr(budget, "memory_limit", lambda: 3 * budget.NODE)
     with pytest.raises(ModelError) as caught:
         compile_network(network, "lagrangian", "numpy")
     assert [d.code for d in caught.value.diagnostics] == ["E119"]
@@ -156,7 +156,7 @@ def test_findings_beyond_the_cap_are_counted():
     errors = [Diagnostic("E101", f"said {k}", source.place(12 * k, 12 * k + 5)) for k in range(MOST + 37)]
     other = [Diagnostic("E101", "said", SourceText("few.sd", text).place(0, 3))]
     warnings = [Diagnostic("W201", f"said {k}", source.place(12 * k, 12 * k + 5)) for k in range(MOST)]
-    kept = shortened([*errors, *other, *warnings])
+    kept = limit_findings([*errors, *other, *warnings])
     assert [d for d in kept if d.severity != "note"] == [*errors[:MOST], *other, *warnings]
     (note,) = [d for d in kept if d.severity == "note"]
     assert note.code == "N101"

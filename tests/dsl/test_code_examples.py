@@ -7,7 +7,7 @@ import pytest
 from sysdyn.api import compile_model
 from sysdyn.cli.console import Console
 from sysdyn.cli.main import run
-from sysdyn.cli.run.check.checking import checked
+from sysdyn.cli.run.check.checking import check_target
 from sysdyn.cli.run.request.targets import all_targets
 from sysdyn.dsl import load
 from sysdyn.dsl.model import expression as ex
@@ -27,7 +27,7 @@ def found(text: str) -> list[str]:
         document = load.document(SourceText("example.sd", text), console.report)
         for target in all_targets(document, console.report):
             with ex.fresh():
-                checked(target, console.report)
+                check_target(target, console.report)
     except ModelError as error:
         console.report.extend(error.diagnostics)
     return [d.code for d in console.report]

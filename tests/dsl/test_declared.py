@@ -293,7 +293,7 @@ def read(expression):
     assert isinstance(elaborator.resolver, Quantities)
     elaborator.resolver.report = report = Report()
     node, space, names = None, elaborator.space, elaborator.resolver
-    with suppress(Failed), elaborator.entering(space), names.within(space.scope, elaborator.source):
+    with suppress(Failed), elaborator.entering(space), names.entering_scope(space.scope, elaborator.source):
         node = names.resolve(space.scope.symbols["y"].expression).node
     said += [(d.code, d.message, text[d.place.span.start : d.place.span.end]) for d in report]
     return node, elaborator, said

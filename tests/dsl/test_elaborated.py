@@ -136,8 +136,8 @@ def test_what_a_component_asks_of_its_user():
 def test_statements_of_a_kind_are_picked_in_their_order():
     found, _ = component()
     body = Body((statement, ()) for statement in found.body)
-    assert [s.name.name for s, _ in body.of(syntax.Level)] == ["ideal", "real"]
-    assert body.of(syntax.Level) is body.of(syntax.Level)
+    assert [s.name.name for s, _ in body.statements_of(syntax.Level)] == ["ideal", "real"]
+    assert body.statements_of(syntax.Level) is body.statements_of(syntax.Level)
     assert len(list(body)) == len(found.body)
 
 

@@ -6,7 +6,7 @@ from sysdyn.dsl.elaborate.elaborate import Elaborator
 from sysdyn.dsl.elaborate.files import FileScope
 from sysdyn.dsl.elaborate.instances.connections import Ends
 from sysdyn.dsl.elaborate.instances.instances import BUILTINS
-from sysdyn.dsl.elaborate.parts import NetworkBuilder, declared, flatten
+from sysdyn.dsl.elaborate.parts import NetworkBuilder, declarations_of, flatten
 from sysdyn.dsl.elaborate.statements.events import Draft
 from sysdyn.dsl.elaborate.statements.statements import STATEMENTS
 from sysdyn.dsl.model import expression as ex
@@ -160,7 +160,7 @@ def test_builtin_elements_are_the_one_and_two_ports():
 def test_bodies_are_flattened_with_the_loops_around_each_statement():
     elaborator, _ = begun("model m { for i in 1..2 { for j in 1..3 { param a[i, j] = 1 } }\n param b = 2 }")
     found = [(s, [loop.index.name for loop in loops]) for s, loops in flatten(elaborator.model.body)]
-    assert [([d.name for d in declared(s)], loops) for s, loops in found] == [(["a"], ["i", "j"]), (["b"], [])]
+    assert [([d.name for d in declarations_of(s)], loops) for s, loops in found] == [(["a"], ["i", "j"]), (["b"], [])]
 
 
 def test_ends_say_what_a_connection_joins():

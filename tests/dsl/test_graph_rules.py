@@ -19,7 +19,7 @@ def elaborated(body, before=""):
     source = SourceText("m.sd", f"{before}model m {{\n{body}\n}}\n")
     report = Report()
     document = load.document(source, report)
-    model, _ = load._elaborated(document, document.models["m"], None, report, (), ())
+    model, _ = load._elaborate(document, document.models["m"], None, report, (), ())
     assert not list(report), list(report)
     return model, source
 

@@ -49,13 +49,13 @@ def test_a_unit_is_rewritten(wrong, right):
 
 @pytest.mark.parametrize("word", ["float", "foo", "xyz", "mhz", "q", "unit"])
 def test_what_is_no_unit_is_not_made_one(word):
-    assert unit_habits.respelled(word) is None
+    assert unit_habits.correct_spelling(word) is None
 
 
 @pytest.mark.parametrize("name", units.names())
 def test_right_units_are_left_alone(name):
-    assert unit_habits.respelled(name) is None
-    assert unit_habits.respelled(f"{name}^2/s") is None
+    assert unit_habits.correct_spelling(name) is None
+    assert unit_habits.correct_spelling(f"{name}^2/s") is None
 
 
 @pytest.mark.parametrize("name", unit_habits.OTHER_SYSTEMS)
@@ -78,7 +78,9 @@ def test_measures_of_other_systems():
         number, unit = unit_habits.OTHER_SYSTEMS[name].split()
         scale = 1.0
         for sign, factor in re.findall(r"([./]?)([A-Za-z]+)", unit):
-            scale = scale / float(units.known(factor)[1]) if sign == "/" else scale * float(units.known(factor)[1])
+            scale = (
+                scale / float(units.find_unit(factor)[1]) if sign == "/" else scale * float(units.find_unit(factor)[1])
+            )
         assert float(number) * scale == pytest.approx(value, rel=1e-9)
 
 

@@ -72,7 +72,7 @@ def test_units_are_all_there():
     names, prefixes, takers = (set(part.replace("(or µ)", "").split()) for part in said.groups())
     assert names == set(units.names())
     for name in names:
-        takes = {p for p in prefixes if units.known(p + name) and units.known(p + name) != units.known("1")}
+        takes = {p for p in prefixes if units.find_unit(p + name) and units.find_unit(p + name) != units.find_unit("1")}
         assert (name in takers) == (len({p for p in takes if p + name not in names}) > 3), name
     assert prefixes == set("fpnumcdkMGT")
 
@@ -101,7 +101,7 @@ def _all():
     ("word", "name"), [("unit", "units"), ("functions", "expressions"), ("phi", "constraints"), ("scene", "scenes")]
 )
 def test_words_lead_to_their_page(word, name):
-    assert topics.named(word).name == name
+    assert topics.find_topic(word).name == name
 
 
 def test_help_knows_commands_and_codes(capsys):

@@ -46,7 +46,7 @@ class Read:
 
     def __init__(self):
         document = load.document(SourceText("m.sd", TEXT), Report())
-        self.model, _ = load._elaborated(document, document.models["m"], None, Report(), (), ())
+        self.model, _ = load._elaborate(document, document.models["m"], None, Report(), (), ())
         self.known = Values(self.model.parts.parameters, [])
         self.context = self.model.resolver
 
@@ -61,7 +61,7 @@ class Read:
         expression, source = self.parsed(text)
         self.context.report = report = Report()
         try:
-            with self.model.entering(self.model.space), self.context.within(self.model.space.scope, source):
+            with self.model.entering(self.model.space), self.context.entering_scope(self.model.space.scope, source):
                 return do(expression)
         except Failed:
             (d,) = report

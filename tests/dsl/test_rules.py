@@ -46,7 +46,7 @@ def fresh():
 def parts(fresh):
     """The network of TEXT, whatever its own rules say of it."""
     document = load.document(SourceText("m.sd", TEXT), Report())
-    elaborator, reader = load._elaborated(document, document.models["parts"], None, Report(), (), ())
+    elaborator, reader = load._elaborate(document, document.models["parts"], None, Report(), (), ())
     return load._result(elaborator, reader, None)
 
 

@@ -4,13 +4,13 @@ from fractions import Fraction
 
 import pytest
 from sysdyn.dsl import load
-from sysdyn.dsl.elaborate.instances.unit_variables import _solved
+from sysdyn.dsl.elaborate.instances.unit_variables import _solve_units
 from sysdyn.dsl.elaborate.scenes.listing import Instance, Readable, instances, readable
 from sysdyn.dsl.elaborate.scenes.scenes import SceneReader
 from sysdyn.dsl.model import dimensions as dim
 from sysdyn.dsl.model import expression as ex
 from sysdyn.dsl.model.evaluation import evaluate
-from sysdyn.dsl.model.units import NONE, known, multiply, raised
+from sysdyn.dsl.model.units import NONE, find_unit, multiply, power_of
 from sysdyn.dsl.model.values import Values
 from sysdyn.dsl.text.diagnostics import Place, Report, SourceText
 
@@ -37,7 +37,7 @@ def read(body):
     """The scene, its reader and what is said of it (code, message, help, text)."""
     report, source = Report(), SourceText("m.sd", f"{MODEL}{body}\n}}\n")
     document = load.document(source, report)
-    model, reader = load._elaborated(document, document.models["m"], document.scenes["s"], report, (), ())
+    model, reader = load._elaborate(document, document.models["m"], document.scenes["s"], report, (), ())
     assert isinstance(reader, SceneReader)
     scene = reader.read(document.scenes["s"], Place(source, document.scenes["s"].name.span))
     said = [(d.code, d.message, d.help, source.text[d.place.span.start : d.place.span.end]) for d in report]
@@ -186,7 +186,7 @@ model m {
 def test_names_that_can_be_read_with_their_units():
     document = load.document(SourceText("m.sd", LISTED), Report())
     report = Report()
-    model, _ = load._elaborated(document, document.models["m"], None, report, (), ())
+    model, _ = load._elaborate(document, document.models["m"], None, report, (), ())
     assert list(report) == []
     assert instances(model) == (Instance("c", "cell", ("fine", "none"), "fine"),)
     found = readable(model, Values(model.parts.parameters, []))
@@ -225,7 +225,7 @@ def unit(text):
     found = NONE
     for factor in text.split():
         name, _, power = factor.partition("^")
-        found = multiply(found, known(name)[0], int(power or 1))
+        found = multiply(found, find_unit(name)[0], int(power or 1))
     return found
 
 
@@ -235,7 +235,7 @@ def solved(*equations):
         ({n: Fraction(e) for n, e in left.items()}, unit(right), f"p{k}") for k, (left, right) in enumerate(equations)
     ]
     names = {n for left, _ in equations for n in left}
-    return {n: dim.show(d) for n, d in _solved(Frame(), Statement(), names, rows, {}).items()}
+    return {n: dim.show(d) for n, d in _solve_units(Frame(), Statement(), names, rows, {}).items()}
 
 
 def test_units_follow_from_what_an_instance_is_given():
@@ -246,7 +246,7 @@ def test_units_follow_from_what_an_instance_is_given():
         ({"$u": 2}, "m^3"),
     ) == {"$u": "m^1.5"}
     assert solved(({"$u": 1}, "s"), ({"$u": 3}, "s^3")) == {"$u": "s"}
-    assert raised(unit("m^3"), Fraction(1, 2))[0][1] == Fraction(3, 2)
+    assert power_of(unit("m^3"), Fraction(1, 2))[0][1] == Fraction(3, 2)
 
 
 def test_units_that_are_open_or_contradict_each_other():
@@ -277,7 +277,7 @@ def traced(items, *settings):
     report = Report()
     document = load.document(SourceText("m.sd", ARRAYS.replace("TRACE", f"trace {items}")), report)
     scene = document.scenes["s"]
-    _, reader = load._elaborated(document, document.models["a"], scene, report, settings, ())
+    _, reader = load._elaborate(document, document.models["a"], scene, report, settings, ())
     reader.read(scene, Place(document.file.source, scene.span))
     return [o.name for o in reader.observations], [(d.code, d.message) for d in report]
 

@@ -5,7 +5,7 @@ import io
 import pytest
 from sysdyn.api import check
 from sysdyn.dsl import load
-from sysdyn.dsl.elaborate.scenes.stopping import unwatched
+from sysdyn.dsl.elaborate.scenes.stopping import drop_measuring_states
 from sysdyn.dsl.model.dependence import in_order
 from sysdyn.dsl.rules.lossless import WHAT
 from sysdyn.dsl.text.decoding import decode
@@ -61,7 +61,7 @@ def test_a_table_that_a_trace_alone_reads_stops_the_run_by_a_state_of_its_own():
     network = load.network(document, document.models["m"], document.scenes["s"], report)
     assert not list(report.diagnostics)
     assert [s.name.startswith("T range") for s in network.states] == [True]
-    still = unwatched(network)
+    still = drop_measuring_states(network)
     assert (still.states, still.dynamics) == ((), ())
     assert [o.name for o in still.observations] == ["x", "pull"]
     assert len(still.initials) == len(network.initials) - 1

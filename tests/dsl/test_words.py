@@ -6,12 +6,12 @@ import pytest
 from sysdyn.dsl import load
 from sysdyn.dsl.format.layout import CONTINUATION, WIDTH, fill
 from sysdyn.dsl.model import collecting
-from sysdyn.dsl.model.units import Unit, known
+from sysdyn.dsl.model.units import Unit, find_unit
 from sysdyn.dsl.names import habits
-from sysdyn.dsl.names.fitting import in_unit, refitted
+from sysdyn.dsl.names.fitting import fitting_unit, in_unit
 from sysdyn.dsl.names.symbols import Family, ParameterSymbol, Scope, nearest
 from sysdyn.dsl.names.unit_reading import read_unit
-from sysdyn.dsl.parser.foreign import around, glued, spice
+from sysdyn.dsl.parser.foreign import explain_suffix, find_slip, spice
 from sysdyn.dsl.text.codes import codes
 from sysdyn.dsl.text.diagnostics import Report, SourceText
 from sysdyn.dsl.text.remedies import REMEDIES
@@ -71,8 +71,8 @@ def test_a_domain_has_its_own_words_for_effort_and_flow():
 def test_one_parameter_is_blamed_once_wherever_it_is_read():
     said = habits.unitless("m", "2", MASS)
     assert said == "'m' is a number without unit; in kg it fits: param m = 2 kg"
-    assert habits.blamed(said) == "unit of m"
-    assert habits.blamed("a factor in kg is missing") is None
+    assert habits.unitless_parameter(said) == "unit of m"
+    assert habits.unitless_parameter("a factor in kg is missing") is None
 
 
 # -- spellings ---------------------------------------------------------------------------------------------------------
@@ -88,7 +88,7 @@ def test_one_parameter_is_blamed_once_wherever_it_is_read():
     ],
 )
 def test_a_number_with_something_grown_to_it(number, unit, said):
-    assert glued(number, unit) == said
+    assert explain_suffix(number, unit) == said
 
 
 def test_a_line_of_a_netlist():
@@ -110,13 +110,13 @@ def test_a_line_of_a_netlist():
 )
 def test_a_sign_that_others_write(text, sign, kind, meant):
     start = text.rindex(sign) if sign != "." else text.index(sign)
-    found = around(text, start, start + len(sign), kind)
+    found = find_slip(text, start, start + len(sign), kind)
     assert found is not None
     assert found.meant == meant
 
 
 def test_a_sign_of_the_language_is_no_slip():
-    assert around("y = a*b", 5, 6, "*") is None
+    assert find_slip("y = a*b", 5, 6, "*") is None
 
 
 def test_the_nearest_name_differs_in_case_before_it_differs_in_letters():
@@ -147,11 +147,11 @@ def test_a_number_in_the_dimension_that_is_wanted():
 def test_the_parameter_whose_unit_would_make_a_product_fit():
     """b*v in newtons where b is in kg: a factor 1/s is missing, and with b in N.s/m it fits."""
     scope = Scope(symbols={"b": parameter("b", MASS), "v": parameter("v", (("m", 1), ("s", -1)))})
-    assert refitted(scope, named("b"), (("s", -1),)) == "'b' is in kg, N.s/m is wanted"
+    assert fitting_unit(scope, named("b"), (("s", -1),)) == "'b' is in kg, N.s/m is wanted"
     product = syntax.Product((("*", named("b")), ("*", named("v"))), HERE)
-    found = refitted(scope, product, (("s", -1),))
+    found = fitting_unit(scope, product, (("s", -1),))
     assert found == "a factor in s^-1 is missing; with 'b' in N.s/m (it is in kg) it fits"
-    assert refitted(scope, syntax.Number(3.0, "3", HERE), LENGTH) is None
+    assert fitting_unit(scope, syntax.Number(3.0, "3", HERE), LENGTH) is None
 
 
 def unit_of(text):
@@ -186,7 +186,7 @@ def test_a_unit_of_the_file_goes_before_those_that_are_known():
     unit, source = unit_of("furlong")
     scope = Scope(units={"furlong": Unit(LENGTH, 201.168, "furlong")})
     assert float(read_unit(unit, scope, source, Report()).scale) == 201.168
-    assert known("furlong") is None
+    assert find_unit("furlong") is None
 
 
 # -- trees, lines, the collector ---------------------------------------------------------------------------------------
@@ -214,7 +214,7 @@ def test_no_garbage_is_sought_inside_and_it_is_again_behind():
     with collecting.at_rest(), collecting.at_rest():
         assert not gc.isenabled()
     assert gc.isenabled()
-    assert not collecting.kept()
+    assert not collecting.is_keeping()
 
 
 def test_what_a_long_text_becomes_is_old_at_once(monkeypatch):

@@ -13,7 +13,7 @@ from pathlib import Path
 sys.path.insert(0, str(Path(__file__).parent))
 from event_verdicts import KINDS, judge
 from random_events import FAMILIES, drawn
-from sysdyn.cli.page.columns import aligned
+from sysdyn.cli.page.columns import align
 
 LEAST = 0.95
 """Of all models: how many must be met."""
@@ -41,7 +41,7 @@ def main() -> int:
         count = Counter(v.kind for v in group)
         sums = sum(v.events for v in group), sum(v.steps for v in group), round(sum(v.cpu for v in group), 1)
         rows.append((name, *(str(count[kind]) for kind in KINDS), *map(str, sums)))
-    print(aligned(rows, right=range(1, 8)))
+    print(align(rows, right=range(1, 8)))
     count = Counter(v.kind for v in found)
     return int(count["hung"] + count["fault"] > 0 or count["met"] < LEAST * len(found))
 

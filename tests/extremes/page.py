@@ -16,7 +16,7 @@ import numpy as np
 sys.path.insert(0, str(Path(__file__).parent))
 from cases import families
 from judged import RIGHT, Verdict, judge
-from sysdyn.cli.page.columns import aligned
+from sysdyn.cli.page.columns import align
 from sysdyn.cli.page.document import document, table
 
 KINDS = ("right", "refused", "falsely", "wrong", "unbounded")
@@ -100,7 +100,7 @@ def main() -> int:
             found[family.name] = family.axis, group
             print(f"{family.name:44s} {dict(Counter(v.kind for v in group))}", file=sys.stderr, flush=True)
     rows = [("family", *KINDS), *((name, *_counts(group)) for name, (_, group) in found.items())]
-    print(aligned(rows, right=range(1, 6)))
+    print(align(rows, right=range(1, 6)))
     for _, group in found.values():
         for v in group:
             if v.kind != "right":

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 from reduced import ROOT
 from reference_values import load
-from sysdyn.cli.analysis.asked import begun, compiled
+from sysdyn.cli.analysis.asked import compile_target, model_at_start
 from sysdyn.cli.run.request.asked import Request
 from sysdyn.compiler.binding.oracle import Oracle
 from sysdyn.dsl.text.diagnostics import Report
@@ -60,9 +60,9 @@ def begin(entry):
     request = Request(path, formulation=entry.formulation, backend="numpy", scene="reference")
     if entry.key == "redundant_pendulum":
         request = Request(path, formulation=entry.formulation, backend="numpy", redundancy="minimum_norm")
-    made = compiled(request, report)
+    made = compile_target(request, report)
     assert made is not None, [f"{d.code} {d.message}" for d in report]
-    found = begun(*made, request, report)
+    found = model_at_start(*made, request, report)
     assert found is not None, [f"{d.code} {d.message}" for d in report]
     return made[1], found
 

@@ -9,7 +9,7 @@ from sysdyn.api import simulate
 from sysdyn.cli.run.generated import module_of
 from sysdyn.cli.run.prepare import Prepared
 from sysdyn.compiler.network import gathered as gathered_
-from sysdyn.compiler.network.gathered import gathered
+from sysdyn.compiler.network.gathered import gather_families
 from sysdyn.compiler.pipeline import compile_network
 from sysdyn.dsl import load
 from sysdyn.dsl.model.expression import fresh
@@ -65,7 +65,7 @@ def run(folder, text, name, **options):
 @pytest.mark.one_in(12)
 def test_a_netlist_runs_as_it_does_element_by_element(name, tmp_path, monkeypatch):
     text = NETLISTS[name]
-    families = gathered(network(text))
+    families = gather_families(network(text))
     assert families.authors
     text_of_c = {} if name != "mesh" else {"backend": "numpy"}  # its borders make the C compiler's the longest test
     one = run(tmp_path, text, "families", **text_of_c)
@@ -149,7 +149,7 @@ def test_a_grid_without_a_ground_is_counted_from_one_of_its_nodes(tmp_path, monk
     text = power_grid(30).replace("-> ground", "-> earth").replace("to 5 ms", "to 100 us")
     text = text.replace("  node bus0:", "  node earth: electrical\n  node bus0:")
     found = network(text)
-    assert gathered(found).authors
+    assert gather_families(found).authors
     assert compile_network(found, gather=True).written is None
     one = run(tmp_path, text, "families", backend="numpy")
     monkeypatch.setattr(gathered_, "LEAST", 10**9)
@@ -212,7 +212,7 @@ def test_initial_values_that_contradict_each_other_are_told_at_their_own_lines(t
     """Beside a family's statements one more: its element is named, not the family's first."""
     monkeypatch.setattr(gathered_, "LEAST", 16)
     text = ladder(16, begun=True).replace("\n}\n\nscene", "\n  init R12.f = 3 mA\n}\n\nscene")
-    assert gathered(network(text)).authors
+    assert gather_families(network(text)).authors
     (tmp_path / "n.sd").write_text(text)
     with pytest.raises(ModelError) as refused:
         simulate(tmp_path / "n.sd", output=tmp_path / "n.h5", backend="numpy")

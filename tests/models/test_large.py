@@ -278,10 +278,10 @@ def test_a_run_that_there_is_no_memory_for_is_not_begun(tmp_path, capsys, monkey
     path = tmp_path / "line.sd"
     path.write_text(LINE.read_text().replace("param n = 100000", "param n = 1000"))
     monkeypatch.setattr(budget, "there", lambda: 8 << 20)
-    monkeypatch.setattr(budget, "granted", lambda: 8 << 20)
+    monkeypatch.setattr(budget, "memory_limit", lambda: 8 << 20)
     assert run(["check", str(path)]) == 0
     capsys.readouterr()
     assert run(["simulate", str(path), "-o", str(tmp_path / "t.h5")]) == 1
     said = capsys.readouterr().err
     assert "E119" in said
-    assert f"needs {budget.shown(5002 * budget.STEPPED)}" in said
+    assert f"needs {budget.format_bytes(5002 * budget.STEPPED)}" in said

@@ -110,7 +110,9 @@ def test_beside_its_own_variable(function, letter, domain, place):
         return
     both = square(function, own, domain, 2, known.own) + f"*(1 + {other}/(1 {unit(domain, letter)}))"
     found = findings(written(place, domain, [both]))
-    right = letter in known.allowed(complementary=place == "cocoord") and letter in there and has(domain, function)
+    right = (
+        letter in known.allowed_letters(complementary=place == "cocoord") and letter in there and has(domain, function)
+    )
     assert (not found) == right, found
 
 

@@ -14,7 +14,7 @@ import pytest
 from model_runs import FOUR, attempt, trace_of
 from random_pruning import compared
 from sysdyn.cli.main import run as command
-from sysdyn.compiler.network.pruning import pruned
+from sysdyn.compiler.network.pruning import prune_network
 from sysdyn.dsl import load
 from sysdyn.dsl.model.network import Network
 from sysdyn.dsl.text.diagnostics import Report, SourceText
@@ -109,7 +109,7 @@ def _pruned(text, scene="s"):
     found = document.scenes[scene]
     network = load.network(document, load.model_of(document, found, report), found, report)
     assert network is not None, [d.message for d in report]
-    return pruned(network)
+    return prune_network(network)
 
 
 KEPT = {

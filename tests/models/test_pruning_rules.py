@@ -8,7 +8,7 @@ import types
 from pathlib import Path
 
 import pytest
-from sysdyn.compiler.network.pruning import pruned
+from sysdyn.compiler.network.pruning import prune_network
 from sysdyn.dsl import load
 from sysdyn.dsl.text.diagnostics import Report, SourceText
 from test_pruning import ISLES, KEPT, OPEN, UNREAD, with_more
@@ -180,12 +180,12 @@ def _mutated(monkeypatch, changed, old, new):
         module = types.ModuleType(full)
         monkeypatch.setitem(sys.modules, full, module)
         exec(compile(text, full, "exec"), module.__dict__)  # noqa: S102 (our own text)
-    return module.pruned
+    return module.prune_network
 
 
 @pytest.mark.long
 def test_a_broken_rule_is_noticed(networks, monkeypatch):
-    right = _left_out(networks, pruned)
+    right = _left_out(networks, prune_network)
     assert right == _left_out(networks, _mutated(monkeypatch, "", "", ""))
     unnoticed = []
     for name, changes in MUTANTS.items():

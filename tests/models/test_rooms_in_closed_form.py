@@ -3,10 +3,10 @@
 import numpy as np
 import pytest
 from start_strategies import prepared_start
-from sysdyn.cli.analysis.linear import linearised
+from sysdyn.cli.analysis.linear import linearise
 from sysdyn.cli.analysis.states import state_of
 from sysdyn.cli.export.starts import start_tables
-from sysdyn.cli.export.tables import assembled
+from sysdyn.cli.export.tables import assembly_tables
 from sysdyn.cli.run.events import plan
 from sysdyn.cli.run.request.asked import Request
 from sysdyn.cli.run.verdict.culprit import undefined_at_start
@@ -75,7 +75,7 @@ def test_a_mass_hangs_where_its_spring_bears_it(tmp_path):
     found, why = state_of(Request(str(tmp_path / "m.sd"), backend="numpy"), None, (), Report(), rest=True)
     assert why is None
     assert at(found.system, found.state.y, "x") == pytest.approx(-1.3 * 9.80665 / 52.0, rel=1e-12)
-    linear = linearised(found, ())
+    linear = linearise(found, ())
     assert sorted(mode.eigenvalue.imag for mode in linear.modes)[-1] == pytest.approx(np.sqrt(52.0 / 1.3), rel=1e-12)
     assert max(abs(mode.eigenvalue.real) for mode in linear.modes) < 1e-12
 
@@ -162,7 +162,7 @@ def test_a_coordinate_without_inertia_has_no_underlying_equation():
 def test_tables_of_an_export_are_the_pattern_and_the_start_of_the_system():
     """Rows of a mass on a spring: its balance alone, as written, over x, x' and x''."""
     _, system, state, _, _ = start_of(HANGING)
-    tables = assembled(system)
+    tables = assembly_tables(system)
     assert (tables.unknowns, tables.entries) == (system.unknowns, system.pattern.row.size)
     start = start_tables(system, state)
     assert start.known == pytest.approx([0.01, 0.0, -52.0 * 0.01 / 1.3 - 9.80665], rel=1e-14)

@@ -12,7 +12,7 @@ from scipy.optimize import minimize_scalar
 from start_strategies import strategies
 from sysdyn import api
 from sysdyn.cli.options import EVERY
-from sysdyn.cli.run.start.starting import SOUGHT, sought
+from sysdyn.cli.run.start.starting import SOUGHT, strategy_note
 from sysdyn.dsl.text.diagnostics import ModelError
 from sysdyn.runtime.start.strategies import STRATEGIES
 from sysdyn.runtime.trace.trace import Trace
@@ -74,7 +74,7 @@ def test_a_run_says_by_which_strategy_its_start_was_found(tmp_path):
     text = (GALLERY / "diode_circuit.sd").read_text().replace("~ 0 V", "~ 100 V")
     ran, _ = attempt(tmp_path, text.replace("sin(2*pi*50 Hz*t)", "cos(2*pi*50 Hz*t)"))
     assert ran.started.state.strategy == "perturbed_guess"
-    assert sought(ran.started.state) == f"the start was found {SOUGHT['perturbed_guess']} (perturbed_guess)"
+    assert strategy_note(ran.started.state) == f"the start was found {SOUGHT['perturbed_guess']} (perturbed_guess)"
     assert Trace.open(tmp_path / "trace.h5").attributes["start_strategy"] == "perturbed_guess"
     assert set(SOUGHT) == {name for name, _ in STRATEGIES[1:]}
 

@@ -13,7 +13,7 @@ def command(console: Console) -> int:
 
     Exit 1 where something is wrong; what is only slower or left out is a warning.
     """
-    from sysdyn.cli.page.columns import aligned
+    from sysdyn.cli.page.columns import align
     from sysdyn.cli.project.health import examine
 
     found = list(examine())
@@ -25,5 +25,5 @@ def command(console: Console) -> int:
             rows.append((f.state, f.name, f.said))
             rows += [("", "", f"help: {f.help}")] if f.help else []
     if rows:
-        console.data(aligned(rows))
+        console.data(align(rows))
     return console.finish(1 if wrong else 0)

@@ -7,12 +7,12 @@ import difflib
 import click
 from sysdyn.cli.console import Console, with_console
 from sysdyn.cli.failures import UsageError
-from sysdyn.cli.options import offered
+from sysdyn.cli.options import complete_for_shell
 from sysdyn.dsl.text import codes
 
 
 @with_console("explain")
-@click.argument("code", required=False, shell_complete=offered)
+@click.argument("code", required=False, shell_complete=complete_for_shell)
 def command(console: Console, code: str | None) -> int:
     """Explain CODE: the rule, its reason, a text that breaks it and one that keeps it. Without CODE: the index."""
     if code is None:

@@ -6,16 +6,17 @@ import click
 from sysdyn.cli import whole_files
 from sysdyn.cli.console import Console, with_console
 from sysdyn.cli.failures import UsageError
-from sysdyn.cli.options import offered
+from sysdyn.cli.options import complete_for_shell
 
 
 @with_console("help")
-@click.argument("topic", required=False, shell_complete=offered)
+@click.argument("topic", required=False, shell_complete=complete_for_shell)
 @click.option("--html", "html_file", metavar="FILE", help="Write everything, library and codes too, as one page.")
 def command(console: Console, topic: str | None, html_file: str | None) -> int:
     """Explain TOPIC, a page of the language; a command or a code of a finding too. Without TOPIC: the index."""
     from sysdyn.cli.manual import topics
 
+    # all topics as one page
     if html_file is not None:
         if topic is not None:
             raise UsageError("--html writes all topics: leave the topic out")
@@ -26,14 +27,16 @@ def command(console: Console, topic: str | None, html_file: str | None) -> int:
             console.say(html_file)
         console.result = {"file": html_file}
         return console.finish()
+    # the index
     if topic is None:
         console.result = {"topics": [{"name": t.name, "title": t.title} for t in topics.topics().values()]}
         console.data(f"sysdyn help TOPIC\n\n{topics.index()}\n\n{_OTHER}")
         return console.finish()
-    page = topics.named(topic.lower())
+    # a topic; else a command, or the code of a finding
+    page = topics.find_topic(topic.lower())
     text = topics.page(page) if page else _elsewhere(topic)
     if text is None:
-        raise UsageError(_unknown(topic, list(topics.topics())))
+        raise UsageError(_no_such_topic(topic, list(topics.topics())))
     console.result = {"topic": page.name if page else topic, "text": text}
     console.data(text)
     return console.finish()
@@ -60,7 +63,7 @@ def _elsewhere(topic: str) -> str | None:
     return found.get_help(click.Context(found, info_name=topic, parent=context))
 
 
-def _unknown(topic: str, names: list[str]) -> str:
+def _no_such_topic(topic: str, names: list[str]) -> str:
     from sysdyn.dsl.names.symbols import nearest
 
     near = nearest(topic, names)

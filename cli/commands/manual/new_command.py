@@ -23,8 +23,8 @@ def command(console: Console, name: Path) -> int:
 
     folder = real(name)
     written = skeleton.write(folder)
-    model = skeleton.named(folder)
-    said = _recorded(folder, f"{model}.sd")
+    model = skeleton.model_name(folder)
+    said = _record_golden(folder, f"{model}.sd")
     kept = sorted(p for p in (folder / "golden").rglob("*") if p.is_file()) if said is None else []
     console.result = {"folder": str(name), "files": [str(p.relative_to(folder)) for p in (*written, *kept)]}
     if said is not None:
@@ -38,7 +38,7 @@ def command(console: Console, name: Path) -> int:
     return console.finish()
 
 
-def _recorded(folder: Path, file: str) -> str | None:
+def _record_golden(folder: Path, file: str) -> str | None:
     """Record the golden trace of a new project; what went wrong, None where nothing did."""
     from sysdyn.cli.main import run
     from sysdyn.cli.project.skeleton import GOLDEN_SCENE

@@ -5,11 +5,11 @@ from __future__ import annotations
 import click
 from sysdyn.cli.console import Console, with_console
 from sysdyn.cli.failures import UsageError
-from sysdyn.cli.options import offered
+from sysdyn.cli.options import complete_for_shell
 
 
 @with_console("std")
-@click.argument("name", required=False, shell_complete=offered)
+@click.argument("name", required=False, shell_complete=complete_for_shell)
 def command(console: Console, name: str | None) -> int:
     """Show the standard library: the index, a module, or the ports, parameters, laws and an example of NAME."""
     from sysdyn.cli.manual import library
@@ -17,7 +17,7 @@ def command(console: Console, name: str | None) -> int:
     module = (name or "").removeprefix("std.")
     entry = None if name is None or (name.startswith("std.") and "." not in module) else library.find(name)
     if entry is None and name is not None and module not in library.modules():
-        raise UsageError(_unknown(name, [e.name for e in library.entries()], [*library.modules()]))
+        raise UsageError(_no_such_entry(name, [e.name for e in library.entries()], [*library.modules()]))
     if entry is not None:
         console.result = library.account(entry)
         console.data(library.page(entry))
@@ -31,7 +31,7 @@ def command(console: Console, name: str | None) -> int:
     return console.finish()
 
 
-def _unknown(name: str, names: list[str], modules: list[str]) -> str:
+def _no_such_entry(name: str, names: list[str], modules: list[str]) -> str:
     from sysdyn.dsl.names.laws import ONE_PORTS, TWO_PORTS
     from sysdyn.dsl.names.symbols import nearest
 

@@ -41,6 +41,7 @@ def command(
     FILES may be folders (all .sd files below them) and patterns ('models/**/*.sd'). The forms concise, github, junit
     and sarif go to standard output.
     """
+    # folders and patterns become files
     given, files = files, tuple(targets.files(files))
     console.explain = explain
     _form(console, output_format, files)
@@ -49,6 +50,7 @@ def command(
     if fix and "-" in files:
         raise UsageError("--fix writes files: standard input is none")
     refused = strict and not allow_unsupported
+    # once
     if not watch:
         return _all(console, files, refused, jobs, strict=strict, fix=fix)
     if "-" in files or console.as_json or output_format in ("junit", "sarif"):
@@ -56,21 +58,23 @@ def command(
     from sysdyn.cli.run.check import watching
 
     seen = watching.stamps(given)
+    # then whenever a file changes
     while True:  # until it is interrupted
         console.renew()
         code = _all(console, tuple(targets.files(given)), refused, jobs, strict=strict, fix=fix)
         console.say(f"exit {code}; waiting for a change of {', '.join(given)}")
-        seen = watching.changed(given, watching.stamps(given) if fix else seen)
+        seen = watching.wait_for_change(given, watching.stamps(given) if fix else seen)
 
 
 def _all(console: Console, files: Sequence[str], refused: bool, jobs: int | None, *, strict: bool, fix: bool) -> int:
     """Check the files and show what was found; the exit code."""
     results, unread = [], False
 
-    def mended(asked: tuple[str, bool, bool]) -> Checked:
+    # a file is mended before it is checked
+    def mend_and_check(asked: tuple[str, bool, bool]) -> Checked:
         """In this process, behind the repair."""
         try:
-            changes = {"fixed": _fixed(console, asked[0])} if fix else {}
+            changes = {"fixed": _mend_file(console, asked[0])} if fix else {}
         except OSError as error:
             return Checked(unread=classify(error)[1])
         except ModelError as error:
@@ -79,13 +83,18 @@ def _all(console: Console, files: Sequence[str], refused: bool, jobs: int | None
         return found if found.result is None else replace(found, result=found.result | changes)
 
     asked = [(path, refused, console.explain) for path in files]
-    for path, found in zip(files, each(file_checked, asked, 1 if fix or "-" in files else jobs, mended), strict=True):
+    # in processes, in the order of the files
+    for path, found in zip(
+        files, each(file_checked, asked, 1 if fix or "-" in files else jobs, mend_and_check), strict=True
+    ):
+        # a process that died is no finding
         if isinstance(found, Lost):
             raise RuntimeError(f"the process that checked {path} died ({found.how})")
         console.report.extend(found.found)
         for said, text in found.said:
             (console.data if said == "data" else console.say)(text)
         results += [] if found.result is None else [found.result]
+        # a file that cannot be read
         if found.unread is not None:
             unread = True
             console.complain(found.unread, INPUT_OUTPUT)
@@ -96,16 +105,16 @@ def _all(console: Console, files: Sequence[str], refused: bool, jobs: int | None
     return console.finish(INPUT_OUTPUT if unread else 1 if strict and warned else 0)
 
 
-def _fixed(console: Console, path: str) -> list[dict[str, object]]:
+def _mend_file(console: Console, path: str) -> list[dict[str, object]]:
     """Mend a file in place; the findings that were mended."""
     from sysdyn.cli import whole_files
     from sysdyn.cli.commands.model.fmt_command import difference
-    from sysdyn.cli.run.check.mending import mended
+    from sysdyn.cli.run.check.mending import mend
     from sysdyn.dsl.text.diagnostics import SourceText
     from sysdyn.dsl.text.source import real
 
     source = SourceText.read(path)
-    text, done = mended(source)
+    text, done = mend(source)
     if done:
         whole_files.replace(real(Path(path)), text)
         if console.format is None:

@@ -8,9 +8,9 @@ from typing import Any
 import click
 from sysdyn.cli.console import Console, with_console
 from sysdyn.cli.export import files
-from sysdyn.cli.export.asked import formed_of, network_of, refused
+from sysdyn.cli.export.asked import formed_of, network_of, report_impossible
 from sysdyn.cli.options import chosen
-from sysdyn.cli.page.columns import aligned
+from sysdyn.cli.page.columns import align
 from sysdyn.cli.run.prepare import Prepared, prepare
 from sysdyn.cli.run.request.asked import Request
 from sysdyn.compiler.forms import descriptor
@@ -41,6 +41,7 @@ def command(console: Console, folder: str | None, dump: str | None, explain: boo
         network = network_of(request, console.report)
         if network is None:
             return console.finish(1)
+        # before anything is compiled
         if dump == "network":
             console.result = {"stage": dump, "text": network_text.show(network)}
             console.data(console.result["text"])
@@ -49,17 +50,19 @@ def command(console: Console, folder: str | None, dump: str | None, explain: boo
         prepared = prepare(network, console.report, formulation=request.formulation, backend=backend, prune=prune)
         if prepared is None:
             return console.finish(1)
+        # a stage of the compiler as text
         if dump:
             made = prepared.compiled
             stages = {
-                "reflected": lambda: network_text.show(made.lettered(made.family)),
-                "coordinates": lambda: network_text.show(made.lettered(made.network)),
+                "reflected": lambda: network_text.show(made.in_author_letters(made.family)),
+                "coordinates": lambda: network_text.show(made.in_author_letters(made.network)),
                 "energies": lambda: energies.show(prepared.compiled.energies, prepared.formulation),
                 "descriptor": lambda: descriptor.show(prepared.compiled.form),
                 "program": lambda: program_text.show(prepared.compiled.program),
             }
             console.result = {"stage": dump, "text": stages[dump]()}
             console.data(console.result["text"])
+        # files, beside a dump only where a folder is named
         if dump is None or folder is not None:
             _write(console, prepared, request.index, Path(folder or "."))
     if explain:
@@ -79,7 +82,7 @@ def _account(prepared: Prepared) -> str:
     if not prepared.network.events and not prepared.network.switches:
         system = System(prepared.structure, prepared.arrays, prepared.carrier)
         rows += [("sum", what, why) for what, why in departures(system)]
-    return aligned(rows) if rows else "coordinate style: nothing was merged or pruned"
+    return align(rows) if rows else "coordinate style: nothing was merged or pruned"
 
 
 def _write(console: Console, prepared: Prepared, index: str | None, folder: Path) -> None:
@@ -89,7 +92,7 @@ def _write(console: Console, prepared: Prepared, index: str | None, folder: Path
         text = f"'{happens[0].name}' is not part of an exported residual yet: it is one smooth piece"
         console.report.error("E608", text, happens[0].place, help="sysdyn simulate, or --dump")
         return
-    with refused(prepared, console.report):
+    with report_impossible(prepared, console.report):
         formed = formed_of(prepared, index, console.report)
         if formed is None:
             return

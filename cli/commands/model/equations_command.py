@@ -29,7 +29,7 @@ def command(console: Console, form: str, alphabet: str, no_prune: bool, index: s
     elements: the law of each store and dissipator with T, T*, V, V*, D, G side by side.
     port_hamiltonian: E z' = (J - R) e + G u with E^T e = dH/dz, J = -J^T, R >= 0 (whether it is, by `check --explain`).
     """
-    from sysdyn.cli.analysis.asked import compiled
+    from sysdyn.cli.analysis.asked import compile_target
     from sysdyn.cli.equations.forms import content_of
     from sysdyn.cli.equations.sheet import Sheets
     from sysdyn.cli.equations.typeset import page
@@ -39,14 +39,19 @@ def command(console: Console, form: str, alphabet: str, no_prune: bool, index: s
 
     with ex.fresh():
         request = Request(index=index, **{**options, "backend": "numpy"})
+        # the linear form alone moves inputs
         inputs = None if form == "linear" else ()
-        made = compiled(request, console.report, inputs=inputs, choose=still)
+        made = compile_target(request, console.report, inputs=inputs, choose=still)
         lagranges = made is not None and made[1].formulation == "lagrangian"
+        # Hamilton's equations, where nobody named another formulation
         if form == "canonical" and lagranges and request.formulation in (None, "auto"):  # nobody named them
-            made = compiled(replace(request, formulation="hamiltonian"), console.report, inputs=inputs, choose=still)
+            made = compile_target(
+                replace(request, formulation="hamiltonian"), console.report, inputs=inputs, choose=still
+            )
         if made is None:
             return console.finish(1)
         target, prepared = made
+        # a form that the model does not have is said as a finding
         try:
             content = content_of(target, prepared, form, request, console.report)
         except NoSuchEquations as error:
@@ -54,6 +59,7 @@ def command(console: Console, form: str, alphabet: str, no_prune: bool, index: s
             return console.finish(1)
         if content is None:
             return console.finish(1)
+        # the same content as text, LaTeX or a page
         sheet = Sheets(prepared.compiled, [c.name for c in prepared.network.coordinates]).sheet(content)
         if alphabet == "html":
             text = page(f"{target.name}: {prepared.formulation}, {form}", content, prepared.compiled)

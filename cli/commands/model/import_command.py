@@ -10,7 +10,7 @@ from sysdyn.cli.console import Console, with_console
 from sysdyn.cli.failures import UsageError
 from sysdyn.cli.spice.model_text import Writer
 from sysdyn.cli.spice.reading import Reader
-from sysdyn.cli.spice.writing import formatted
+from sysdyn.cli.spice.writing import format_fast
 from sysdyn.dsl.text.decoding import decode
 from sysdyn.dsl.text.diagnostics import SourceText
 
@@ -33,7 +33,7 @@ def command(console: Console, file: str, output: str | None) -> int:
     text = Writer(reader.netlist, source, console.report).text()
     if console.report.failed:
         return console.finish(1)
-    text = formatted(text)
+    text = format_fast(text)
     console.result = {"text": text, "output": output}
     if output is None:
         console.data(text, verbatim=True)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import click
 from sysdyn.cli.console import Console, with_console
-from sysdyn.cli.options import Setting, offered
+from sysdyn.cli.options import Setting, complete_for_shell
 from sysdyn.cli.run.request import targets
 from sysdyn.dsl import load
 from sysdyn.dsl.model import expression as ex
@@ -12,9 +12,13 @@ from sysdyn.dsl.model import expression as ex
 
 @with_console("list")
 @click.argument("file")
-@click.option("--scene", metavar="NAME", shell_complete=offered, help="With the settings and levels of a scene.")
-@click.option("--model", metavar="NAME", shell_complete=offered, help="This model alone.")
-@click.option("--level", "levels", type=Setting(), multiple=True, shell_complete=offered, help="PATH=NAME; repeatable.")
+@click.option(
+    "--scene", metavar="NAME", shell_complete=complete_for_shell, help="With the settings and levels of a scene."
+)
+@click.option("--model", metavar="NAME", shell_complete=complete_for_shell, help="This model alone.")
+@click.option(
+    "--level", "levels", type=Setting(), multiple=True, shell_complete=complete_for_shell, help="PATH=NAME; repeatable."
+)
 def command(
     console: Console, file: str, scene: str | None, model: str | None, levels: tuple[tuple[str, str], ...]
 ) -> int:
@@ -22,6 +26,7 @@ def command(
     from sysdyn.cli.manual import names
 
     document = targets.read(file, console.report)
+    # the model that is named, or all of the file
     chosen = [targets.whole(document, file, model, scene, console.report)] if scene or model else _models(document)
     accounts = []
     for target in chosen:

@@ -43,6 +43,7 @@ def command(console: Console, tries: int, no_prune: bool, index: str | None, **o
         "formulation": found.prepared.formulation,
         "equilibria": [state.to_json() for state in states],
     }
+    # not found is the solver's exit code
     if not states:
         console.complain(NO_REST.format(f" and {tries} points around them", found.state.t) + why, SOLVER)
         return console.finish(SOLVER)

@@ -11,7 +11,7 @@ from sysdyn.cli import whole_files
 from sysdyn.cli.console import Console, with_console
 from sysdyn.cli.failures import SOLVER, UsageError
 from sysdyn.cli.options import INDICES, chosen
-from sysdyn.cli.page.columns import aligned, complex_text
+from sysdyn.cli.page.columns import align, complex_text
 from sysdyn.cli.run.request.asked import Request
 from sysdyn.runtime.trace.opening import replaceable
 
@@ -56,11 +56,12 @@ def command(
     The whole model is taken, also what the scene does not need. The matrices E, A, B, C, D are those of the form as
     written, or of --index; eigenvalues are those of the motion on the constraint manifold.
     """
+    # two places at once
     if at is not None and equilibrium:
         raise UsageError("--at together with --equilibrium: an instant of a run, or a state of rest")
     kinds = _kinds(response)
-    _known(files)
-    from sysdyn.cli.analysis.linear import linearised
+    _check_outputs(files)
+    from sysdyn.cli.analysis.linear import linearise
     from sysdyn.cli.analysis.states import state_of
     from sysdyn.cli.run.request.asked import separate
     from sysdyn.dsl.model import expression as ex
@@ -81,7 +82,7 @@ def command(
         from sysdyn.cli.analysis.linear import inputs_of
 
         try:
-            linear = linearised(found, inputs_of(found.target, found.prepared, moved), form)
+            linear = linearise(found, inputs_of(found.target, found.prepared, moved), form)
         except NoLinearisation as error:
             console.report.error("E607", f"no linearisation: {error}", found.prepared.network.place)
             return console.finish(1)
@@ -97,8 +98,10 @@ def command(
     if found.prepared.network.discretes:
         console.say(f"events do not act: {', '.join(sorted(found.prepared.network.discretes)[:6])} held")
     parts = [_table(linear)]
+    # curves are computed where a kind or a picture asks for them
     pictures = any(Path(file).suffix in PICTURES for file in files)
     curves = answers.answers(linear) if kinds or pictures else ()
+    # in text and in --json
     if kinds:
         console.result["responses"] = [answers.answer_to_json(a, kinds) for a in curves]
         parts += [answers.answer_to_text(a, kinds) for a in curves]
@@ -108,6 +111,7 @@ def command(
         console.result["locus"] = answers.locus_to_json(over)
         parts.append(answers.locus_to_text(over))
     console.results("\n\n".join(parts))
+    # data and pictures
     for file in files:
         _write(file, linear, curves, over, kinds, found.target.name, console)
     if files:
@@ -123,6 +127,7 @@ def _along(text: str, found: Any) -> tuple[str, list[float]]:
 
     known = {p.name: p.unit.dimension for p in found.prepared.network.parameters}
 
+    # values in the unit of the parameter
     def evaluate(name: str, said: str) -> float | None:
         plain = name.partition("[")[0]
         if plain not in known:
@@ -136,6 +141,7 @@ def _along(text: str, found: Any) -> tuple[str, list[float]]:
     values = [v for v in along.values if isinstance(v, float)]
     if along.name.partition("[")[0] not in known:
         raise UsageError(f"--locus: there is no parameter '{along.name}'; there are: {', '.join(known) or 'none'}")
+    # a grid or a list of numbers
     if along.drawn or len(values) != len(along.values) or not 2 <= len(values) <= MOST:
         raise UsageError(f"--locus '{text}': NAME=FIRST..LAST:NUMBER, or a list of 2 to {MOST} numbers")
     return along.name, values
@@ -157,7 +163,7 @@ def _kinds(response: str | None) -> tuple[str, ...]:
     return kinds
 
 
-def _known(files: Iterable[str]) -> None:
+def _check_outputs(files: Iterable[str]) -> None:
     for file in files:
         if Path(file).suffix not in (*DATA, *PICTURES):
             raise UsageError(f"-o '{file}': one of {', '.join((*DATA, *PICTURES))}")
@@ -270,6 +276,7 @@ def _result(linear: Any, formulation: str, index: str) -> dict[str, Any]:
         "formulation": formulation,
         "index": index,
     }
+    # outputs by rates: only where there are such
     if form.cd.any():
         result["Cd"] = form.cd.tolist()
     for name, part in (("D1", small.d1), ("D2", small.d2)):
@@ -291,7 +298,7 @@ def _still(linear: Any) -> str:
 
 def _table(linear: Any) -> str:
     """Modes and transfer functions as text."""
-    lines = [aligned(_modes(linear))] if linear.modes else ["no states"]
+    lines = [align(_modes(linear))] if linear.modes else ["no states"]
     for t in linear.transfers:
         lines += ["", linear.label(t)]
         lines.append(f"  gain   {t.gain:.9g}" + ("" if t.static is None else f", at rest {t.static:.9g}"))
@@ -306,12 +313,12 @@ def _modes(linear: Any) -> list[list[str]]:
     rows = [["eigenvalue [1/s]", "damping", "frequency [rad/s]", "participation", "energy in"]]
     for mode, energies in zip(linear.modes, linear.energies, strict=True):
         damping = "" if mode.damping is None else f"{mode.damping:.4g}"
-        shares = _listed(linear.reduced.names, mode.participation), _listed(linear.stores, energies)
+        shares = _largest_shares(linear.reduced.names, mode.participation), _largest_shares(linear.stores, energies)
         rows.append([complex_text(mode.eigenvalue), damping, f"{mode.frequency:.6g}", *shares])
     return rows if linear.stores else [row[:-1] for row in rows]
 
 
-def _listed(names: Sequence[str], shares: Sequence[float]) -> str:
+def _largest_shares(names: Sequence[str], shares: Sequence[float]) -> str:
     """Those that take part most."""
     order = sorted(range(len(names)), key=lambda k: -shares[k])
     return ", ".join(f"{names[k]} {100 * shares[k]:.0f} %" for k in order[:4] if shares[k] >= 0.05)

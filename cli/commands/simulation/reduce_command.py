@@ -11,7 +11,7 @@ from sysdyn.cli import whole_files
 from sysdyn.cli.console import Console
 from sysdyn.cli.failures import SOLVER, UsageError
 from sysdyn.cli.options import scene_command
-from sysdyn.cli.page.columns import aligned
+from sysdyn.cli.page.columns import align
 from sysdyn.cli.reduce.activity import Activities
 from sysdyn.cli.reduce.reduction import Cost, Reduced, reduce
 from sysdyn.cli.report.balance import WORDS
@@ -40,19 +40,23 @@ def command(
     from sysdyn.cli.commands.simulation.trade_command import budget_of
 
     request = Request(**options)
+    # the reduced text has to go somewhere
     if request.file == "-" and output is None and not only:
         raise UsageError("a text from standard input: -o names the reduced one")
     if output is not None and Path(output).suffix != ".sd":
         raise UsageError(f"-o {output}: a model's text ends in .sd")
     target = Path(output) if output else Path(request.file).parent / f"{Path(request.file).stem}-reduced.sd"
+    # never over the model
     if target.exists() and Path(request.file).exists() and target.samefile(request.file):
         raise UsageError(f"-o {target} is the model itself")
     if plot is not None and Path(plot).suffix not in KINDS:
         raise UsageError(f"--plot '{plot}': a picture of activities is one of {', '.join(KINDS)}")
+    # traces of trials go with the folder
     with tempfile.TemporaryDirectory(prefix="sysdyn-") as folder, console.progress(progress) as line:
         found = reduce(request, console.report, Path(folder), only=only, budget=budget_of(max_wall), progress=line)
     if found is None:
         return console.unable() if console.report.failed else console.finish(SOLVER)
+    # a text is written where something was left out
     kept = any(t.kept for t in found.trials)
     console.result = _result(found, str(target) if kept else None, timings=not no_timings)
     console.results(_activity(found.found))
@@ -77,16 +81,17 @@ def _activity(found: Activities) -> str:
         bar = "#" * round(BAR * a.share / most) if most > 0.0 else ""
         sum_ = "" if a.role == "through" else f"{100.0 * total:.3f} %"
         rows.append([a.label, WORDS[a.role], f"{a.activity:.4g}", f"{100.0 * a.share:.3f} %", sum_, bar])
-    return aligned(rows, right=(2, 3, 4))
+    return align(rows, right=(2, 3, 4))
 
 
 def _summary(found: Reduced, target: Path, *, kept: bool, timings: bool) -> str:
+    """A table of the trials, and what the reduction came to."""
     rows = [["change", "", "share", "error", ""]]
     for t in found.trials:
         error = "-" if t.error is None else f"{t.error:.1e}"
         reason = t.reason if len(t.reason) <= 70 else t.reason[:67] + "..."
         rows.append([t.label, t.how, f"{100.0 * t.share:.3f} %", error, "kept" if t.kept else reason])
-    lines = ["", aligned(rows, right=(2, 3))] if found.trials else [""]
+    lines = ["", align(rows, right=(2, 3))] if found.trials else [""]
     if not found.ended:
         lines.append("the budget of wall time is spent: elements that were not tried may go too")
     number = sum(t.kept for t in found.trials)
@@ -108,6 +113,8 @@ def _costs(full: Cost, reduced: Cost, *, timings: bool) -> str:
 
 
 def _result(found: Reduced, target: str | None, *, timings: bool) -> dict[str, Any]:
+    """The object of --json: activities, trials, costs."""
+
     def cost(c: Cost | None) -> dict[str, Any] | None:
         if c is None:
             return None

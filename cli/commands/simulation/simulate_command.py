@@ -31,20 +31,27 @@ def command(console: Console, progress: str, no_timings: bool, **options: Any) -
     """Simulate a scene of FILE and write its trace."""
     from sysdyn.cli.run.request.asked import Request
     from sysdyn.cli.run.running import run
-    from sysdyn.cli.run.start.starting import described, shortened, sought
+    from sysdyn.cli.run.start.starting import change_lines, first_lines, strategy_note
 
     request = Request(timings=not no_timings, **options)
     if request.output == "-" and console.as_json:
         raise UsageError("-o - and --json both want standard output")
     with console.progress(progress) as line:
-        ran = _streamed(request, console, line) if _streams(request.output) else run(request, console.report, line)
+        # HDF5 to standard output is made in a file first
+        ran = (
+            _simulate_to_stream(request, console, line)
+            if _streams(request.output)
+            else run(request, console.report, line)
+        )
     if ran is None:
         return console.unable()
     console.result = _result(ran)
-    found = sought(ran.started.state)
-    moves = shortened(described(ran.prepared, ran.started.state))
+    # how the start was found, what it moved, what the run warns of
+    found = strategy_note(ran.started.state)
+    moves = first_lines(change_lines(ran.prepared, ran.started.state))
     for text in (*moves, *([found] if found else []), *ran.outcome.warnings):
         console.say(text)
+    # expectations of a run that is not met are shown, and not judged
     if ran.outcome.judgement is not None and not ran.outcome.met:
         for claim in ran.claims:
             found = "" if claim.value is None else f": {claim.value:.9g} at {claim.time:.9g} s"
@@ -61,7 +68,7 @@ def _streams(output: str | None) -> bool:
     return path.exists() and not path.is_file() and not path.is_dir()
 
 
-def _streamed(request: Request, console: Console, line: ProgressLine) -> Ran | None:
+def _simulate_to_stream(request: Request, console: Console, line: ProgressLine) -> Ran | None:
     """HDF5 cannot be streamed: the trace is made in a folder of its own and copied."""
     import tempfile
 
@@ -79,6 +86,7 @@ def _streamed(request: Request, console: Console, line: ProgressLine) -> Ran | N
 
 
 def _summary(ran: Ran) -> str:
+    """Two or three lines: how the run was made, its steps and error, what is conserved, where the trace is."""
     o = ran.outcome
     s, t = o.statistics, o.timings
     estimate = "" if o.error_estimate is None else f", estimated error {o.error_estimate:.1e}"
@@ -95,13 +103,13 @@ def _summary(ran: Ran) -> str:
         f"{ran.target.name}: {', '.join(how)}",
         f"  {span} in {s['steps']} steps, {spent(t['cpu_integrate_s'])} of CPU{estimate}",
         *([f"  {', '.join(meters)}"] if meters else []),
-        *(f"  {text}" for text in _conserved(ran)),
+        *(f"  {text}" for text in _conservation_lines(ran)),
         f"  {o.trace}{'' if o.final else ' (not final)'}{'' if o.met or not o.final else ' (not met)'}",
     ]
     return "\n".join(lines)
 
 
-def _conserved(ran: Ran) -> list[str]:
+def _conservation_lines(ran: Ran) -> list[str]:
     """A line on each of the first quantities that should keep their value."""
     found = ran.outcome.judgement.conserved if ran.outcome.judgement else ()
     lines = [f"conserved: {b.title}, {b.value:.1e} of {b.turnover:.3g} {b.unit}" for b in found[:SHOWN]]
@@ -113,7 +121,8 @@ def _last(values: Any) -> float:
 
 
 def _result(ran: Ran) -> dict[str, Any]:
-    from sysdyn.cli.run.start.starting import described
+    """The object of --json."""
+    from sysdyn.cli.run.start.starting import change_lines
 
     o = ran.outcome
     return {
@@ -133,7 +142,7 @@ def _result(ran: Ran) -> dict[str, Any]:
         "not_met": [missed.to_json() for missed in o.judgement.not_met] if o.judgement else [],
         "conserved": o.judgement.kept() if o.judgement else [],
         "expects": [asdict(c) for c in ran.claims],
-        "moved": described(ran.prepared, ran.started.state),
+        "moved": change_lines(ran.prepared, ran.started.state),
         "warnings": list(o.warnings),
         "failure": ran.failure,
     }

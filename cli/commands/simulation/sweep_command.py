@@ -10,7 +10,7 @@ from sysdyn.cli import whole_files
 from sysdyn.cli.console import Console, with_console
 from sysdyn.cli.failures import UsageError, worst
 from sysdyn.cli.options import chosen, solved
-from sysdyn.cli.page.columns import aligned
+from sysdyn.cli.page.columns import align
 from sysdyn.cli.run.many.crew import cores
 from sysdyn.cli.run.request.asked import Request, default_output
 from sysdyn.cli.sweep.in_core import KEEPS
@@ -68,6 +68,7 @@ def command(
     if plot is not None and Path(plot).suffix not in KINDS:
         raise UsageError(f"--plot '{plot}': one of {', '.join(KINDS)}")
     said: dict[str, Any] = {}
+    # a study: its options are defaults of those on the command line
     if file.endswith(".toml"):
         found = read(file)
         file, said = found.file, dict(found.options)
@@ -78,6 +79,7 @@ def command(
     kept = keep or said.get("keep") or "traces"
     if kept not in KEEPS:
         raise UsageError(f"keep = '{kept}': one of {', '.join(KEEPS)}")
+    # the model is loaded once, for all runs
     runner = Runner(request, kept)
     asked = study(
         axes_of(runner, over),
@@ -85,9 +87,10 @@ def command(
         runs if runs is not None else said.get("runs"),
         seed if seed is not None else said.get("seed", 0),
     )
-    scene = runner.loaded().target.scene
+    scene = runner.load_model().target.scene
     named = default_output(file, scene.name.name if scene else "", "-sweep.h5")
     target = Path(output or said.get("output") or named)
+    # never over the model, nor over a file of others
     if target.suffix == ".sd" or (target.exists() and target.samefile(file)):
         raise UsageError(f"-o {target} is the model itself")
     if target.is_file() and not replaceable(target, sweep=True):
@@ -95,10 +98,11 @@ def command(
     number = jobs or said.get("jobs") or cores()
     with console.progress(progress) as line:
         swept = sweep(request, asked, target, number, line, timings=not no_timings, keep=kept, dask=dask, runner=runner)
-    return _shown(console, swept, plot)
+    return _show_results(console, swept, plot)
 
 
-def _shown(console: Console, found: Swept, plot: str | None) -> int:
+def _show_results(console: Console, found: Swept, plot: str | None) -> int:
+    """Show table, picture and failed runs of a sweep; the exit code."""
     console.result = to_json(found)
     console.results(_table(found))
     if plot is not None:
@@ -110,7 +114,7 @@ def _shown(console: Console, found: Swept, plot: str | None) -> int:
     if found.alone and len(found.cases) > SHOWN:
         console.say(f"one by one: {found.alone}")
     for kept in found.failed[:SHOWN]:
-        console.complain(f"run {kept.run} ({_said(found, kept.run)}): {kept.reason}", kept.exit, kept.finding)
+        console.complain(f"run {kept.run} ({_settings_text(found, kept.run)}): {kept.reason}", kept.exit, kept.finding)
     if len(found.failed) > SHOWN:
         console.complain(f"and {len(found.failed) - SHOWN} more: 'reason' in {found.output}", _exit(found))
     return console.finish(_exit(found))
@@ -121,7 +125,7 @@ def _exit(found: Swept) -> int:
     return worst(found.exits)
 
 
-def _said(found: Swept, run: int) -> str:
+def _settings_text(found: Swept, run: int) -> str:
     return ", ".join(f"{name} = {_text(value)}" for name, value in found.cases[run].items())
 
 
@@ -133,18 +137,20 @@ def _table(found: Swept) -> str:
     """Every run where they are few; else the spread of the end values."""
     if len(found.cases) <= SHOWN:
         names = list(next((k.end for k in found.kept if k.end), {}) or {})[:COLUMNS]
-        varied = [_headed(found, n) for n in found.cases[0]]
-        head = ["run", *varied, *(_headed(found, n, " at the end") for n in names), ""]
+        varied = [_column_head(found, n) for n in found.cases[0]]
+        head = ["run", *varied, *(_column_head(found, n, " at the end") for n in names), ""]
         rows = []
         for k in found.kept:
             ends = [_text((k.end or {}).get(n, "-")) for n in names]
             rows.append([str(k.run), *map(_text, found.cases[k.run].values()), *ends, _mark(k)])
-        return aligned([head, *rows], right=range(len(head) - 1))
-    rows = [[_headed(found, name), *(_text(v) for v in spread.values())] for name, spread in summary(found).items()]
-    return aligned([["at the end", "least", "median", "largest"], *rows], right=(1, 2, 3))
+        return align([head, *rows], right=range(len(head) - 1))
+    rows = [
+        [_column_head(found, name), *(_text(v) for v in spread.values())] for name, spread in summary(found).items()
+    ]
+    return align([["at the end", "least", "median", "largest"], *rows], right=(1, 2, 3))
 
 
-def _headed(found: Swept, name: str, when: str = "") -> str:
+def _column_head(found: Swept, name: str, when: str = "") -> str:
     """`x at the end [m]`."""
     return f"{name}{when}{f' [{unit}]' if (unit := found.unit(name)) else ''}"
 

@@ -14,7 +14,7 @@ from sysdyn.cli import whole_files
 from sysdyn.cli.console import Console
 from sysdyn.cli.failures import SOLVER, UsageError
 from sysdyn.cli.options import scene_command, side_by_side
-from sysdyn.cli.page.columns import aligned, fitted, refusals, terminal
+from sysdyn.cli.page.columns import align, fit_columns, refusals, terminal
 from sysdyn.cli.run.request import lock, targets
 from sysdyn.cli.run.request.asked import Request, instants_of
 from sysdyn.cli.trade.pages import HEADS, cells, page, picture, verdict
@@ -56,6 +56,7 @@ def command(
     the search leaves most others out). A trade that was stopped goes on where it was.
     """
     target = _target(output)
+    # a lock stands beside its file
     if locks and options["file"] == "-":
         raise UsageError("--lock of a text from standard input: a lock stands beside a file")
     request = Request(**options)
@@ -68,17 +69,19 @@ def command(
         return console.finish(SOLVER)
     if found is None:
         return console.unable()
+    # the cheapest setting that meets the accuracy
     best = found.chosen
     use = "" if best is None else command_of(request, best, found.name)
     console.result = _result(found, use, timings=not no_timings)
     console.results(_table(found, timings=not no_timings))
+    # a page or a picture of all settings
     if target is not None:
         drawn = page(found, use).encode() if target.suffix == ".html" else picture(found, target.suffix[1:])
         whole_files.write(target, drawn)
         console.say(f"{target}: {len(found.measured)} runs")
     if locks and best is not None:
         console.say(f"{_lock(request, found, best)}: {best.combination.name} for {found.name}")
-    return console.finish(_judged(found, console, use))
+    return console.finish(_report_faults(found, console, use))
 
 
 def _target(output: str | None) -> Path | None:
@@ -104,14 +107,14 @@ def budget_of(text: str | None) -> float | None:
 
 def _lock(request: Request, found: Traded, best: Measured) -> Path:
     """Writes the choice for its scene."""
-    scene = targets.asked(request, Report())
+    scene = targets.target_of(request, Report())
     assert scene is not None
     c = best.combination
     held = lock.Lock(c.formulation, c.index, c.method, c.levels, best.tolerance, found.accuracy)
     return lock.write(request.file, scene, held, __version__)
 
 
-def _judged(found: Traded, console: Console, use: str) -> int:
+def _report_faults(found: Traded, console: Console, use: str) -> int:
     """Says what is wrong; the exit code."""
     if not found.ended:
         console.say("the budget of wall time is spent: settings that were not tried may be cheaper; ask again to go on")
@@ -148,18 +151,19 @@ def command_of(request: Request, best: Measured, name: str) -> str:
 
 def _table(found: Traded, *, timings: bool) -> str:
     """One row a combination (its cheapest run that meets the accuracy, else its most accurate), and the Pareto set."""
-    shown = _shown(found)
+    shown = _best_of_each(found)
     rows = [list(HEADS), *(cells(found, m) for m in found.measured if m in shown)]
     if not timings:
         rows = [[cell for k, cell in enumerate(row) if HEADS[k] != "CPU, ms"] for row in rows]
-    rows, said = fitted(rows, SPARE, terminal())
+    rows, said = fit_columns(rows, SPARE, terminal())
     known = found.reference
-    lines = [aligned(rows, right=range(4, len(rows[0]) - 1)), *([said] if said else []), *_refused(found.refusals)]
+    lines = [align(rows, right=range(4, len(rows[0]) - 1)), *([said] if said else []), *_refusal_lines(found.refusals)]
     lines.append(f"reference: {known.first}, confirmed to {known.uncertainty:.1e} by {known.second}")
     return "\n".join([*lines, verdict(found)])
 
 
-def _shown(found: Traded) -> list[Measured]:
+def _best_of_each(found: Traded) -> list[Measured]:
+    """For each combination the cheapest setting that is accurate enough, else the most accurate; then the front."""
     best: dict[Combination, Measured] = {}
 
     def rank(m: Measured) -> tuple[bool, float]:
@@ -172,7 +176,7 @@ def _shown(found: Traded) -> list[Measured]:
     return [*best.values(), *found.pareto]
 
 
-def _refused(refusals_: Iterable[Refusal]) -> list[str]:
+def _refusal_lines(refusals_: Iterable[Refusal]) -> list[str]:
     """What cannot be run, those with one reason together."""
     return refusals(
         (
@@ -184,6 +188,7 @@ def _refused(refusals_: Iterable[Refusal]) -> list[str]:
 
 
 def _result(found: Traded, use: str, *, timings: bool) -> dict[str, Any]:
+    """The object of --json: settings, those that cannot be run too, the choice and the reference."""
     known, pareto = found.reference, found.pareto
     nothing = dict.fromkeys(("tolerance", "error", "cpu_s", "steps", "work", "energy", "constraints"))
     settings = [setting(m, pareto=m in pareto, timings=timings) for m in found.measured]

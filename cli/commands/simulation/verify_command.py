@@ -10,7 +10,7 @@ import click
 from sysdyn.cli.console import Console
 from sysdyn.cli.failures import INTERRUPTED, SOLVER, worst
 from sysdyn.cli.options import scene_command, side_by_side
-from sysdyn.cli.page.columns import aligned, fitted, refusals, terminal
+from sysdyn.cli.page.columns import align, fit_columns, refusals, terminal
 
 if TYPE_CHECKING:
     from sysdyn.cli.verify.agreement import Gap
@@ -43,12 +43,14 @@ def command(
     from sysdyn.cli.verify.verification import verify
 
     request = Request(timings=not no_timings, **options)
+    # large models run at the sizes that their folder names for this
     path, reduced = (Path(), ()) if full else sizes(request.file)
     given = {name for name, _ in request.settings}
     reduced = tuple((name, value) for name, value in reduced if name not in given)
     if reduced:
         console.say(f"sizes of {path.parent.name}/{path.name}: {', '.join(f'{n} = {v}' for n, v in reduced)}")
     request = replace(request, settings=(*reduced, *request.settings))
+    # traces are kept where a folder is named
     folder = None if output is None else Path(output)
     if folder is not None:
         folder.mkdir(parents=True, exist_ok=True)
@@ -58,36 +60,42 @@ def command(
         return console.unable()
     console.result = _result(found, keep=output is not None, timings=not no_timings)
     console.results(_table(found, timings=not no_timings))
-    code = _judged(found, console)
+    code = _report_faults(found, console)
     if found.interrupted:
         console.complain("interrupted: these are the runs so far", INTERRUPTED)
         code = worst((code, INTERRUPTED))
     return console.finish(code)
 
 
-def _judged(found: Verified, console: Console) -> int:
+def _report_faults(found: Verified, console: Console) -> int:
     """Says what is wrong; the exit code."""
-    from sysdyn.cli.run.start.starting import shortened
+    from sysdyn.cli.run.start.starting import first_lines
 
     code = 0
+    # disagreements
     for text in _complaints(found):
         console.complain(text, 1)
         code = 1
-    for text in shortened(_doubts(found)):
+    # runs that are not met
+    for text in first_lines(_doubts(found)):
         console.complain(text, SOLVER)
         code = SOLVER
-    for text in shortened(_unbalanced(found)):
+    # balances that are off
+    for text in first_lines(_ledger_lines(found)):
         console.complain(text, SOLVER)
         code = SOLVER
     for text in _warnings(found):
         console.say(text)
+    # runs that stopped
     for run in found.failures:
         console.complain(f"{run.name}: {run.failure}", SOLVER, run.finding)
         code = SOLVER
+    # nothing traced, or nothing that all runs have
     if not found.compared:
         why = "; ".join(f"{name}: {reason}" for name, reason in found.left_out) or "the scene traces nothing"
         console.complain(f"there is nothing to compare ({why}); 'trace NAME, ...' in the scene", SOLVER)
         return SOLVER
+    # chaotic from the start on, or too coarse
     if found.beyond is not None and not found.horizon > found.span[0]:
         text = f"{found.beyond.variable} of {found.by} differs at two accuracies from the start on"
         console.complain(f"the traces cannot be compared: {text}; a smaller --accuracy", SOLVER)
@@ -96,13 +104,14 @@ def _judged(found: Verified, console: Console) -> int:
 
 
 def _complaints(found: Verified) -> list[str]:
-    from sysdyn.cli.run.start.starting import shortened
+    """Lines on what disagrees: starts, traces of runs that are met, compiled rows."""
+    from sysdyn.cli.run.start.starting import first_lines
 
     pairs = []
     for d in found.disagreements:
         if d.doubted:
             continue
-        pairs.append(f"{d.one.name} and {d.other.name} disagree: {_apart(d)}")
+        pairs.append(f"{d.one.name} and {d.other.name} disagree: {_disagreement_text(d)}")
     carriers = [
         f"{' and '.join(t.backends)} disagree in {t.formulation}: row {t.row} by {t.difference:.1e} of itself"
         for t in found.twins
@@ -111,7 +120,7 @@ def _complaints(found: Verified) -> list[str]:
     begun = [
         f"{run.name} begins elsewhere than {found.runs[0].name}: {_values(found, gap)}" for run, gap in found.apart
     ]
-    return [*begun, *shortened(pairs), *carriers]
+    return [*begun, *first_lines(pairs), *carriers]
 
 
 def _values(found: Verified, gap: Gap) -> str:
@@ -135,13 +144,13 @@ def _doubts(found: Verified) -> list[str]:
     """Differences from runs that are not met by their own estimate: nothing is known from them."""
     return [
         f"{' and '.join(run.name for run in d.doubted)}: not met by its own estimate, and apart from "
-        f"{(d.one if d.other in d.doubted else d.other).name}: {_apart(d)}"
+        f"{(d.one if d.other in d.doubted else d.other).name}: {_disagreement_text(d)}"
         for d in found.disagreements
         if d.doubted
     ]
 
 
-def _unbalanced(found: Verified) -> list[str]:
+def _ledger_lines(found: Verified) -> list[str]:
     """Ledgers that are off, a line each."""
     return [
         f"{run.name}: the {m.what} ledger is off by {m.value:.2g} {m.unit}, {m.limit:.2g} {m.unit} is allowed, "
@@ -151,7 +160,7 @@ def _unbalanced(found: Verified) -> list[str]:
     ]
 
 
-def _apart(d: Disagreement) -> str:
+def _disagreement_text(d: Disagreement) -> str:
     gap, unit = d.gap, d.one.trace[d.gap.variable].units
     a, b = (f"{value:.6g}{'' if unit == '1' else f' {unit}'}" for value in gap.values)
     worst = f"{gap.variable} is {a} and {b} at {gap.time:.6g} s, {gap.ratio:.3g} times what is allowed"
@@ -180,10 +189,10 @@ def _table(found: Verified, *, timings: bool) -> str:
         rows = [[cell for k, cell in enumerate(row) if k != 5] for row in rows]
     accuracy, (t0, t1) = found.runs[0].accuracy, found.span
     lines = [f"{found.name}: {t0:g} s to {t1:g} s, apart in units of {TIMES:g} x {accuracy:g} x nominal"]
-    rows, said = fitted(rows, SPARE, terminal())
+    rows, said = fit_columns(rows, SPARE, terminal())
     columns = len(rows[0])
-    lines += [aligned(rows, right={*range(2, columns)} - {columns - 2}), *([said] if said else [])]
-    lines += [*_starts(found), *_refused(found)]
+    lines += [align(rows, right={*range(2, columns)} - {columns - 2}), *([said] if said else [])]
+    lines += [*_starts(found), *_refusal_lines(found)]
     lines += [f"not compared: {name}: {reason}" for name, reason in found.left_out]
     if found.twins:
         apart = max(found.twins, key=lambda t: t.difference)
@@ -191,7 +200,7 @@ def _table(found: Verified, *, timings: bool) -> str:
     return "\n".join([*lines, _horizon(found), _verdict(found)])
 
 
-def _refused(found: Verified) -> list[str]:
+def _refusal_lines(found: Verified) -> list[str]:
     """Formulations left out, those with one reason together."""
 
     def reason(r: Refusal) -> str:
@@ -226,6 +235,7 @@ def _horizon(found: Verified) -> str:
 
 
 def _verdict(found: Verified) -> str:
+    """One line: how many runs agree, or that they do not."""
     ended = [run for run in found.runs if not run.failure]
     number = len(ended)
     if found.apart or any(not d.doubted for d in found.disagreements) or not all(t.agree for t in found.twins):
@@ -241,6 +251,7 @@ def _verdict(found: Verified) -> str:
 
 
 def _result(found: Verified, *, keep: bool, timings: bool) -> dict[str, Any]:
+    """The object of --json."""
     runs = [
         _run_object(run, gap, keep=keep, timings=timings)
         for run, gap in zip((*found.runs, found.finer), found.worst, strict=True)
@@ -266,6 +277,7 @@ def _result(found: Verified, *, keep: bool, timings: bool) -> dict[str, Any]:
 
 
 def _run_object(run: Run, gap: Gap | None, *, keep: bool, timings: bool) -> dict[str, Any]:
+    """A run as an object of --json."""
     o = run.outcome
     return {
         "formulation": run.formulation,

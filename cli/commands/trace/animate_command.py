@@ -6,7 +6,7 @@ import click
 from sysdyn.cli import whole_files
 from sysdyn.cli.console import Console, with_console
 from sysdyn.cli.failures import UsageError
-from sysdyn.cli.page.named import destination, label, opened, quantities
+from sysdyn.cli.page.named import destination, label, open_trace, quantities
 
 KINDS = (".html", ".svg")
 
@@ -42,9 +42,11 @@ def command(
     if speed is not None and not 0.0 < speed < float("inf"):
         raise UsageError(f"--speed {speed:g}: more than 0")
     target, kind = destination(trace, output, console, KINDS, "what plays")
-    found = opened(trace)
+    found = open_trace(trace)
     film = animation.film(found, speed)
+    # points by their names, or the links that are given
     joined = animation.links_of(found, links)
+    # what moves a point needs no curve
     taken = animation.quantities_of(joined, found)
     drawn = quantities([found], list(names)) if names else [n for n in quantities([found], []) if n not in taken]
     picture = animation.drawing(film, joined, drawn)

@@ -34,6 +34,7 @@ def command(
     Equal where abs(test - ref) <= atol + rtol * nominal within the time tolerance, in both directions, at all
     instants of both and between them. Exit 0 equal, 1 different, 3 not comparable.
     """
+    # options that can be told wrong before files are read
     for name, value in (("--rtol", rtol), ("--atol", atol)):
         if not 0.0 <= value < math.inf:
             raise UsageError(f"{name} {value:g}: it must be a number that is not negative")
@@ -43,20 +44,23 @@ def command(
     pages = [f for f in (junit_file, html_file) if f == "-"]
     if pages and (console.as_json or len(pages) > 1):
         raise UsageError("only one thing can go to standard output")
-    from sysdyn.cli.compare.diffing import as_json, cases, differences, headline, opened, table
+    from sysdyn.cli.compare.diffing import as_json, cases, differences, headline, open_trace, table
     from sysdyn.cli.page.junit import junit
     from sysdyn.runtime.comparison.verdict import Incomparable, Tolerance
 
     began = time.monotonic()
     try:
-        with opened(ref) as one, opened(test) as two:
+        # both open at once: pages read them in parts
+        with open_trace(ref) as one, open_trace(test) as two:
             verdict = differences(one, two, Tolerance(rtol, atol, wide))
             if html_file:
                 from sysdyn.cli.compare.comparison_page import page
 
                 whole_files.write(html_file, page(f"{test} against {ref}", [(one, two, verdict)]))
+            # traces of runs that stopped or are not met
             unfinished = [(t.path, "did not end as asked") for t in (one, two) if not t.final]
             unfinished += [(t.path, "is not met") for t in (one, two) if t.final and not t.met]
+    # no common quantity, or units of another dimension
     except Incomparable as error:
         console.complain(f"the traces cannot be compared: {error}", SOLVER)
         if junit_file:

@@ -14,7 +14,7 @@ from sysdyn.cli import whole_files
 from sysdyn.cli.console import Console, with_console
 from sysdyn.cli.failures import SOLVER, USAGE, UsageError, worst
 from sysdyn.cli.options import BACKENDS, FORMULATIONS, Setting, of_file, side_by_side
-from sysdyn.cli.page.columns import aligned
+from sysdyn.cli.page.columns import align
 from sysdyn.cli.plain_files import inside, project
 from sysdyn.dsl.text.source import real
 
@@ -89,13 +89,16 @@ def record(
         raise UsageError(f"--rtol {rtol:g} --atol {atol:g}: between 0 and 1, and not negative")
     if request.file == "-":
         raise UsageError("a golden trace belongs to a model in a file")
-    target = targets.asked(request, console.report)
+    target = targets.target_of(request, console.report)
+    # the report says why
     if target is None:
         return console.finish(1)
+    # a golden is of one scene, or of a model without
     scene, model = target.scene.name.name if target.scene else None, target.model.name.name
     request = replace(request, scene=scene, model=None if scene else model)
     label, file = scene or model, Path(request.file)
     place = Path(folder) / (name or file.stem)
+    # goldens of one model stand in one folder
     known = read(place) if (place / BOOK).is_file() else ()
     if not inside(file, project(Path(folder))):
         raise UsageError(f"{file} is outside of the project, {project(Path(folder))}: --folder gives its own")
@@ -103,7 +106,8 @@ def record(
         raise UsageError(f"{place} is of {known[0].model}: --name gives another folder")
     if any(g.name == label for g in known):
         raise UsageError(f"{place.name}/{label} is recorded already: 'sysdyn golden accept' renews it, with a reason")
-    found = _measured(console, request, rtol, atol, jobs)
+    # the record, with its own error measured
+    found = _record_or_exit(console, request, rtol, atol, jobs)
     if isinstance(found, int):
         return console.finish(found)
     said = request.settings, request.until
@@ -153,12 +157,14 @@ def check(
     from sysdyn.cli.golden import book
 
     goldens = book.find(Path(folder), names)
+    # whether goldens notice changes of parameters
     if mutants:
         return _mutants(console, goldens, jobs)
     from sysdyn.cli.golden.jobs import Asked, in_processes
 
     drawn = bool(html_file) or pages
     cases = []
+    # as they come
     for found in in_processes([Asked(g, formulations, methods, backends or ("c",), drawn) for g in goldens], jobs):
         cases += found
         for case in found:
@@ -167,6 +173,7 @@ def check(
 
 
 def _report(console: Console, cases: Sequence[Case], junit_file: str | None, html_file: str | None, pages: bool) -> int:
+    """Show what the checks found, as text, JUnit and page; the exit code."""
     from sysdyn.cli.golden.changes import page
     from sysdyn.cli.golden.checking import checkable
     from sysdyn.cli.page.junit import junit
@@ -195,21 +202,24 @@ def _mutants(console: Console, goldens: Sequence[Golden], jobs: int | None) -> i
     """`check --mutate`: exit 1 where a golden does not notice a change that it could have noticed."""
     from dataclasses import asdict
 
-    from sysdyn.cli.golden.jobs import mutated
+    from sysdyn.cli.golden.jobs import mutate_golden
     from sysdyn.cli.run.many.crew import each
 
     found: list[Mutant] = []
     code = 0
-    for golden, made in zip(goldens, each(mutated, goldens, jobs), strict=True):
+    # each golden's parameters changed by 1 %
+    for golden, made in zip(goldens, each(mutate_golden, goldens, jobs), strict=True):
         mutants, stopped = made if isinstance(made, tuple) else ([], (SOLVER, f"its process died ({made.how})"))
         for mutant in mutants:
             found.append(mutant)
             word = {True: "noticed", False: "MISSED", None: "skipped"}[mutant.noticed]
             by = "" if mutant.noticed is None else f", {mutant.ratio:.3g} of the limit"
             console.say(f"{word:8} {mutant.golden} {mutant.parameter}{by}")
+        # a run that stopped, or a process that died
         if stopped is not None:
             console.complain(f"{golden.label}: {stopped[1]}", stopped[0])
             code = worst((code, stopped[0]))
+    # a parameter of zero cannot be changed by a share
     tried = [m for m in found if m.noticed is not None]
     missed = [m for m in found if m.noticed is False]
     zeros = len(found) - len(tried)
@@ -257,6 +267,7 @@ def accept(
     code, changes = 0, []
     goldens = book.find(Path(folder), names)
     renewed = [golden if rtol is None else replace(golden, rtol=rtol) for golden in goldens]
+    # recorded anew, compared with what is kept
     for golden, wanted, found in zip(goldens, renewed, _again(console, renewed, jobs), strict=True):
         if isinstance(found, int):
             code = worst((code, found))
@@ -265,8 +276,10 @@ def accept(
         changes.append({"golden": golden.label, "change": change})
         if not console.quiet:
             console.data(f"{golden.label}: {text}")
+        # nothing changed
         if change is None:
             continue
+        # shown, and refused
         if reason is None:
             code = worst((code, USAGE))
             continue
@@ -280,10 +293,10 @@ def accept(
 
 def _again(console: Console, goldens: Sequence[Golden], jobs: int | None) -> Iterator[Recorded | int]:
     """The record of each golden, made anew; the exit code after saying why there is none."""
-    from sysdyn.cli.golden.jobs import renewed
+    from sysdyn.cli.golden.jobs import record_again
     from sysdyn.cli.run.many.crew import Lost, each
 
-    for golden, made in zip(goldens, each(renewed, goldens, jobs), strict=True):
+    for golden, made in zip(goldens, each(record_again, goldens, jobs), strict=True):
         died = isinstance(made, Lost)
         said, found = ([], (SOLVER, f"{golden.label}: its process died ({made.how})")) if died else made
         for line in said:
@@ -304,6 +317,7 @@ def list_(console: Console, folder: str) -> int:
     goldens = book.find(Path(folder))
     rows = [("golden", "rtol", "error", "kB", "formulations", "last reason")]
     items = []
+    # a line each, from the book and the trace's size
     for g in goldens:
         size = g.trace.stat().st_size / 1e3 if g.trace.is_file() else math.nan
         reason = g.accepted[-1].reason if g.accepted else ""
@@ -323,14 +337,14 @@ def list_(console: Console, folder: str) -> int:
             }
         )
     console.result = {"goldens": items}
-    console.data(aligned(rows))
+    console.data(align(rows))
     return console.finish()
 
 
 # ---- what record and accept share
 
 
-def _measured(console: Console, request: Request, rtol: float, atol: float, jobs: int | None) -> Recorded | int:
+def _record_or_exit(console: Console, request: Request, rtol: float, atol: float, jobs: int | None) -> Recorded | int:
     """The record; the exit code after saying why there is none."""
     from sysdyn.cli.golden import recording
     from sysdyn.cli.golden.runs import Stopped
@@ -373,6 +387,7 @@ def _keep(console: Console, golden: Golden, found: Recorded, size: float) -> int
         "tau": golden.tau,
         "error": float(f"{golden.error:.2e}"),
     }
+    # written beside, and dropped where it is too large
     need = write_trace(golden.trace, found.trace, attributes, size * 1e3) / 1e3
     if need > size:
         message = f"{golden.label} would be {need:.0f} kB, more than {size:g}"

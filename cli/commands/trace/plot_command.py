@@ -9,7 +9,7 @@ import click
 from sysdyn.cli import whole_files
 from sysdyn.cli.console import Console, with_console
 from sysdyn.cli.page.columns import terminal
-from sysdyn.cli.page.named import destination, label, opened, quantities
+from sysdyn.cli.page.named import destination, label, open_trace, quantities
 
 if TYPE_CHECKING:
     from sysdyn.runtime.trace.trace import Trace
@@ -32,7 +32,7 @@ def command(console: Console, trace: str, names: tuple[str, ...], output: str | 
     """
     files = [trace, *(name for name in names if _is_trace(name))]
     wanted = list(dict.fromkeys(name for name in names if not _is_trace(name)))
-    traces = [(label(file), opened(file)) for file in files]
+    traces = [(label(file), open_trace(file)) for file in files]
     target, kind = destination(trace, output, console, KINDS, "a picture")
     drawn = quantities([t for _, t in traces], wanted)
     data = _drawn(traces, drawn, kind)

@@ -31,6 +31,7 @@ def command(console: Console, progress: str, output: str | None, **options: Any)
     request = Request(**options)
     with ex.fresh():
         with console.progress(progress) as line:
+            # everything that the page shows, collected once
             study = collect(request, console.report, line)
         if study is None:
             return console.unable()

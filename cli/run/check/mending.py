@@ -13,17 +13,17 @@ ROUNDS = 50
 """Of mending and reading again, at most: an error of syntax hides those of names behind it."""
 
 
-def mended(source: SourceText) -> tuple[str, list[Diagnostic]]:
+def mend(source: SourceText) -> tuple[str, list[Diagnostic]]:
     """The text with every safe change made, and the findings that were mended, in the order of mending."""
     done: list[Diagnostic] = []
     for _ in range(ROUNDS):
         found = _found(source)
-        chosen = apart([d for d in found if d.edit is not None and d.edit.place.source.text == source.text])
+        chosen = disjoint_edits([d for d in found if d.edit is not None and d.edit.place.source.text == source.text])
         if not chosen:
             break
-        text = _changed(source.text, [d.edit for d in chosen if d.edit is not None])
+        text = _apply_edits(source.text, [d.edit for d in chosen if d.edit is not None])
         after = SourceText(source.name, text)
-        if _said(_found(after), chosen) >= _said(found, chosen):
+        if _count_repeated(_found(after), chosen) >= _count_repeated(found, chosen):
             break  # what was said is said again: a change that mends nothing is none
         source, done = after, [*done, *chosen]
     return source.text, done
@@ -36,18 +36,18 @@ def _found(source: SourceText) -> list[Diagnostic]:
     for target in all_targets(document, report):
         with ex.fresh():
             load.network(target.document, target.model, target.scene, report, required=False)
-    for _, own in alone.judged(document):
+    for _, own in alone.check_unused_components(document):
         report.extend(own)
     return [d for d in report if d.severity == "error"]
 
 
-def _said(found: list[Diagnostic], chosen: list[Diagnostic]) -> int:
+def _count_repeated(found: list[Diagnostic], chosen: list[Diagnostic]) -> int:
     """How many findings say what one of the chosen says; mending may bring others to light."""
     known = {(d.code, d.message) for d in chosen}
     return sum((d.code, d.message) in known for d in found)
 
 
-def apart(found: Sequence[Diagnostic]) -> list[Diagnostic]:
+def disjoint_edits(found: Sequence[Diagnostic]) -> list[Diagnostic]:
     """Those whose changes do not overlap, in the order of the text."""
     kept: list[Diagnostic] = []
     end = -1
@@ -59,7 +59,7 @@ def apart(found: Sequence[Diagnostic]) -> list[Diagnostic]:
     return kept
 
 
-def _changed(text: str, edits: list[Edit]) -> str:
+def _apply_edits(text: str, edits: list[Edit]) -> str:
     """The text with the edits made, from its end backwards."""
     for edit in reversed(edits):
         start, end = edit.place.span

@@ -34,7 +34,7 @@ def stamps(given: Iterable[str]) -> Stamps:
     return found
 
 
-def changed(given: Iterable[str], before: Stamps) -> Stamps:
+def wait_for_change(given: Iterable[str], before: Stamps) -> Stamps:
     """Wait until the files are others than before; how they are now."""
     names = list(given)
     while (now := stamps(names)) == before:

@@ -54,7 +54,7 @@ class Supply(Protocol):
     def took(self, job: Any, answer: Any, seconds: float) -> Iterator[Any]:
         """A worker's answer; what is handed on of it."""
 
-    def died(self, job: Any, how: str) -> Iterator[Any]:
+    def handle_death(self, job: Any, how: str) -> Iterator[Any]:
         """A worker died of a job, by `signal N` or with `exit N`; what is handed on of that."""
 
 
@@ -79,13 +79,13 @@ class Crew:
     def _fill(self) -> None:
         """As many workers as there are jobs for."""
         while len(self._workers) < self._jobs and (job := self._supply.next()) is not None:
-            with _undisturbed(), self._beginning:
+            with _block_interruptions(), self._beginning:
                 if self._ended:
                     return
-                worker = self._begun(job)
+                worker = self._start_worker(job)
             self._give(worker, job)
 
-    def _begun(self, job: Any) -> _Worker:
+    def _start_worker(self, job: Any) -> _Worker:
         mine, other = _CONTEXT.Pipe()
         process = _CONTEXT.Process(target=self._serve, args=(other, *self._setup), daemon=True)
         process.start()
@@ -107,24 +107,27 @@ class Crew:
             while self._workers:
                 ready = wait([w.pipe for w in self._workers])
                 for worker in [w for w in self._workers if w.pipe in ready]:
-                    yield from self._answered(worker)
+                    yield from self._receive(worker)
                 self._fill()
         finally:
             self.end()
 
-    def _answered(self, worker: _Worker) -> Iterator[Any]:
+    def _receive(self, worker: _Worker) -> Iterator[Any]:
+        """Take a worker's answer and give it the next job; what the supply makes of one that died."""
         try:
             answer = worker.pipe.recv()
+        # it died: by a signal, or by an exit of its own
         except (EOFError, OSError):
             worker.process.join()
             worker.pipe.close()
             self._workers.remove(worker)
             code = worker.process.exitcode
             how = f"signal {-code}" if code is not None and code < 0 else f"exit {code}"
-            yield from self._supply.died(worker.job, how)
+            yield from self._supply.handle_death(worker.job, how)
             return
         found = list(self._supply.took(worker.job, answer, time.monotonic() - worker.began))
         job = self._supply.next()
+        # nothing left for it
         if job is None:
             worker.pipe.close()
             self._workers.remove(worker)
@@ -144,7 +147,7 @@ class Crew:
 
 
 @contextlib.contextmanager
-def _undisturbed() -> Iterator[None]:
+def _block_interruptions() -> Iterator[None]:
     """An interruption waits, and a process that is begun here never hears of one: it is ended by the one who steers.
 
     Half begun it would find its pipe closed, and an interruption before it has said what to do with one would end it
@@ -184,7 +187,7 @@ class _Items:
     def took(self, job: tuple[int, Any], answer: Any, seconds: float) -> Iterator[tuple[int, Any]]:
         yield job[0], answer
 
-    def died(self, job: tuple[int, Any], how: str) -> Iterator[tuple[int, Any]]:
+    def handle_death(self, job: tuple[int, Any], how: str) -> Iterator[tuple[int, Any]]:
         self.deaths[job[0]] = self.deaths.get(job[0], 0) + 1
         if self.deaths[job[0]] < DEATHS:
             self.waiting.append(job)
@@ -240,6 +243,7 @@ def each(
     item raises is raised in its turn.
     """
     done, took = 0, [] if like is None else [like]
+    # here, as long as processes would not pay
     while done < len(items) and _stays(took, len(items) - done, jobs if done or len(items) > 1 else 1):
         began = time.monotonic()
         answer = (here or function)(items[done])
@@ -249,6 +253,7 @@ def each(
     if done == len(items):
         return
     found: dict[int, Any] = {}
+    # then by workers; answers wait for their turn
     for k, answer in Crew(_Items(deque(enumerate(items[done:], done))), jobs or _most(), _call, (function,)).results():
         found[k] = answer
         while done in found:
@@ -275,12 +280,12 @@ class Beside:
     def __init__(self, function: Callable[[Any], Any], item: Any, jobs: int | None) -> None:
         self._crew = Crew(_Items(deque([(0, item)])), 1, _call, (function,))
         self._found: list[Any] = []
-        self._timer = threading.Timer(PAYS, self._made)
+        self._timer = threading.Timer(PAYS, self._collect)
         self._timer.daemon = True
         if (jobs or _most()) > 1:
             self._timer.start()
 
-    def _made(self) -> None:
+    def _collect(self) -> None:
         with contextlib.suppress(OSError):  # it is not wanted any more
             self._found += [answer for _, answer in self._crew.results()]
 

@@ -112,7 +112,7 @@ class InCore:
         self.at, self.written = way.system.form.at, way.system.form.written
         self.guesses = stated(self.at, self.written, way.system.description.initial)[0]
 
-    def alone(self, binding: Binding, moving: frozenset[str]) -> tuple[Floats, Floats] | None:
+    def numbers_of_run(self, binding: Binding, moving: frozenset[str]) -> tuple[Floats, Floats] | None:
         """Numbers p and initial values of one run; None where it has another structure."""
         first = self.prepared.binding
         same = np.array_equal(binding.ix, first.ix) and binding.shapes == first.shapes

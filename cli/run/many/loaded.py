@@ -153,7 +153,7 @@ class Loaded:
         check_tolerances(request)
         self.request = request
         report = Report()
-        target = targets.asked(request, report)
+        target = targets.target_of(request, report)
         if target is None or report.failed:
             raise ModelError(report.diagnostics)
         self.target: Target = target
@@ -164,7 +164,7 @@ class Loaded:
         report.raise_if_failed()
 
     def keeping(self, *, extrema: bool) -> Loaded:
-        """The same text, and what is compiled of it, for runs that keep least and largest values, or do not."""
+        """The loaded text, and what is compiled of it, for runs that keep least and largest values, or do not."""
         other = copy.copy(self)
         other.request = replace(self.request, extrema=extrema)
         return other
@@ -188,19 +188,21 @@ class Loaded:
         return frozenset(found)
 
     @cached_property
-    def _asked(self) -> tuple[Asked, dict[Any, ex.Node]]:
+    def _conditions(self) -> tuple[Asked, dict[Any, ex.Node]]:
         """What the text asks of its numbers, with the space of its expressions."""
         nodes, request = dict[Any, ex.Node](), self.request
         with ex.fresh(nodes):
             model, scene = self.target.model, self.target.scene
-            return load.asked(self.target.document, model, scene, request.settings, request.levels), nodes
+            return load.conditions_on_numbers(
+                self.target.document, model, scene, request.settings, request.levels
+            ), nodes
 
-    def allowed(self, keys: Sequence[Any], values: Floats) -> NDArray[np.bool_]:
+    def allowed_rows(self, keys: Sequence[Any], values: Floats) -> NDArray[np.bool_]:
         """Which rows of numbers [k, keys] the text does not refuse."""
-        asked, nodes = self._asked
+        asked, nodes = self._conditions
         fine = np.ones(len(values), dtype=bool)
         with ex.fresh(nodes):
-            mine = asked.of(frozenset(key if isinstance(key, str) else str(key[0]) for key in keys))
+            mine = asked.conditions_of(frozenset(key if isinstance(key, str) else str(key[0]) for key in keys))
             column = {key: values[:, j] for j, key in enumerate(keys)}
             if not mine.plain or not all(isinstance(key, str) for key in keys):
                 rows = (dict(zip(keys, row, strict=True)) for row in values.tolist())
@@ -219,14 +221,14 @@ class Loaded:
         for at, number in np.ndenumerate(np.asarray(value, dtype=float)):
             yield name, tuple(f + k for f, k in zip(first, at, strict=False)), number
 
-    def _refused(self, numbers: Mapping[Any, Any]) -> bool:
+    def _is_refused(self, numbers: Mapping[Any, Any]) -> bool:
         """Whether the text refuses these numbers."""
         keys, values = list[Any](), list[float]()
         for key, value in numbers.items():
             for name, at, number in self._elements(key, value):
                 keys.append((name, *at) if at else name)
                 values.append(float(number))
-        return not self.allowed(keys, np.array([values]))[0]
+        return not self.allowed_rows(keys, np.array([values]))[0]
 
     def _text(self, settings: tuple[tuple[str, str], ...]) -> Compiled:
         """The text under settings that its numbers cannot take."""
@@ -251,12 +253,15 @@ class Loaded:
             plain = key if isinstance(key, str) else str(key[0])
             parameter = known.get(plain)
             number = value
+            # an array for a name that is none
             if parameter is None and np.ndim(value):
                 raise ModelError([Diagnostic("E405", f"there is no parameter '{plain}'", None)])
+            # a text with units, as on the command line
             if isinstance(value, str) and parameter is not None:
                 silent = Report()
                 with ex.fresh():
                     number = load.constant(self.target.document, value, parameter.unit.dimension, name, silent)
+            # names of levels and inputs, and sizes: the text is read again with them
             if parameter is None or number is None or isinstance(number, str) or plain in self.sizes:
                 texts.append((name, text_of(value)))
             else:
@@ -275,7 +280,7 @@ class Loaded:
         compiled = self._text(texts)
         if not numbers:
             return compiled.prepared, compiled
-        if self._refused(numbers):  # the rules say what is wrong with them
+        if self._is_refused(numbers):  # the rules say what is wrong with them
             each = [one for name, value in settings.items() for one in self._elements(name, value)]
             shown = ((f"{name}[{','.join(map(str, at))}]" if at else name, text_of(value)) for name, at, value in each)
             compiled = self._text(tuple(shown))
@@ -301,9 +306,9 @@ class Loaded:
         request = replace(self.request, **changes) if changes else self.request
         check_tolerances(request)
         prepared, compiled = self.bound(settings)
-        return (self._alone if alone else self._run)(request, prepared, compiled, report)
+        return (self._run_alone if alone else self._run)(request, prepared, compiled, report)
 
-    def _alone(self, request: Request, prepared: Prepared, compiled: Compiled, report: Report) -> Ran | None:
+    def _run_alone(self, request: Request, prepared: Prepared, compiled: Compiled, report: Report) -> Ran | None:
         """A run of which nobody looks at more than its trace once the next one begins."""
         network = prepared.network
         eventful = network.events or network.switches or prepared.compiled.form.kinks
@@ -321,7 +326,7 @@ class Loaded:
         """
         prepared, compiled = self.bound(settings)
         found = self._in_core(settings, prepared, compiled)
-        return found if found is not None else self._alone(self.request, prepared, compiled, report)
+        return found if found is not None else self._run_alone(self.request, prepared, compiled, report)
 
     def _in_core(self, settings: Settings, prepared: Prepared, compiled: Compiled) -> Trace | None:
         """The trace of a run in the core; None where there is none."""
@@ -332,7 +337,7 @@ class Loaded:
             try:
                 names = frozenset(name.partition("[")[0] for name in settings).intersection(self.parameters)
                 moving = compiled.cores.moving(core, names)
-                numbers = None if moving is None else core.alone(prepared.binding, moving)
+                numbers = None if moving is None else core.numbers_of_run(prepared.binding, moving)
                 return None if numbers is None else core.batch.trace(*numbers, tuple(parameters_of(prepared)))
             finally:
                 compiled.cores.give(core)

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from contextlib import suppress
 
-from sysdyn.dsl.model.collecting import kept
+from sysdyn.dsl.model.collecting import is_keeping
 
 TRIM_THRESHOLD, MMAP_MAX = -1, -4
 """Of malloc.h: how much free memory at the heap's end goes back (-1: none), how many arrays have pages of their own."""
@@ -17,7 +17,7 @@ TRIM_THRESHOLD, MMAP_MAX = -1, -4
 
 def keep_pages() -> None:
     """Where the process ends with its command, and its C library has such a choice (glibc's mallopt)."""
-    if not kept():
+    if not is_keeping():
         return
     import ctypes
 

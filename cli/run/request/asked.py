@@ -19,7 +19,7 @@ from sysdyn.compiler.binding.columns import Read, value_of
 from sysdyn.compiler.binding.instants import distinct, instants
 from sysdyn.compiler.binding.jumps import jumps
 from sysdyn.compiler.binding.pulses import pulses, quickest
-from sysdyn.compiler.network.pruning import listed
+from sysdyn.compiler.network.pruning import list_removals
 from sysdyn.dsl import load
 from sysdyn.dsl.elaborate.scenes.scenes import FINEST_ACCURACY
 from sysdyn.dsl.model import dimensions as dim
@@ -75,10 +75,12 @@ class Request:
 
 def check_tolerances(request: Request) -> None:
     """UsageError where --accuracy, --rtol, --atol make no sense."""
+    # the tool chooses the tolerances, or the author does
     if request.accuracy is not None and (request.rtol is not None or request.atol is not None):
         raise UsageError("--accuracy together with --rtol or --atol: the tool chooses the tolerances, or you do")
     if request.accuracy_check and (request.rtol is not None or request.atol is not None):
         raise UsageError("--accuracy-check with --rtol or --atol: there is no estimate to be checked")
+    # what doubles can tell
     if request.rtol is not None and not FINEST_RTOL <= request.rtol < 1.0:
         raise UsageError(f"--rtol {request.rtol:g}: from {FINEST_RTOL:g} to less than 1, what double precision allows")
     if request.accuracy is not None and not FINEST_ACCURACY <= request.accuracy < 1.0:
@@ -128,6 +130,7 @@ def options_of(
     """The runtime's options; None where the report says why not.  began: `time.monotonic()` of the command; held: in
     memory where the request names no file.
     """
+    # a model without a scene: everything by options
     scene = prepared.network.scene or Scene("", prepared.network.place)
     value = prepared.binding.evaluate
 
@@ -135,29 +138,34 @@ def options_of(
     t1 = value(scene.end) if scene.end is not None else None
     if request.until is None and t1 is None and not report.failed:
         raise UsageError(f"{target.name} has no 'time' statement: --until is needed")
+    # the command line before the scene
     until, at, wall = instants_of(request, target.document, report)
     t1 = until if request.until is not None else t1
     if prepared.network.scene is not None:
         report.extend(wrong_numbers(target, prepared.network, value, request))
     if t1 is None or report.failed:
         return None
+    # parameters may make the span nonsense
     if not math.isfinite(t0) or not math.isfinite(t1):
         raise UsageError(f"the run is from {t0:g} s to {t1:g} s: finite instants are needed")
     if not t1 > t0:
         raise UsageError(f"the run ends at {t1:g} s, but it begins at {t0:g} s")
     if text := beyond(t0, t1):
         raise UsageError(text)
+    # jumps of the text that the run cannot take
     report.extend(jumps(prepared.network, prepared.binding.parameters, (t0, t1)))
     if report.failed:
         return None
     every = value(scene.every) if scene.every is not None else None
     if every is not None and (t1 - t0) / every > INSTANTS:
         raise UsageError(f"every {every:g} s from {t0:g} s to {t1:g} s is more than {INSTANTS:.0e} instants")
+    # for all, and of some
     accuracy, on = _accuracy(request, scene, prepared)
     solver = {name: value(node) for name, node in scene.solver_options}
     method = request.method or scene.solver or "auto"
     step = _step(request, target, method, solver.get("step"), report)
     steps = request.max_steps or next((round(value(n)) for name, n in scene.limits if name == "steps"), STEPS)
+    # expectations at instants are sampled there
     claims = tuple(value(e.at) for e in prepared.network.expectations if e.at is not None)
     return Options(
         output=request.output or (None if held else default_output(request.file, scene.name)),
@@ -214,14 +222,14 @@ def _stops(prepared: Prepared, t0: float, t1: float) -> tuple[np.ndarray, str | 
     conditions = {n.data[0] for e in network.events if e.condition is not None for n in ex.variables(e.condition)}
     unseen = [o.expression for o in network.observations if not o.stored]
     crossed = [o.expression for o in network.observations if not o.stored and o.name in conditions]
-    found = instants(*text, unseen, crossed, _closed(network))
+    found = instants(*text, unseen, crossed, _comparisons_at_zero(network))
     answer = distinct(found.times, pulses(*text, crossed, found.times)), found.note
     kept.clear()
     kept[t0, t1] = answer, {name: value_of(binding, name) for name in read.read}
     return answer
 
 
-def _closed(network: Network) -> list[ex.Node]:
+def _comparisons_at_zero(network: Network) -> list[ex.Node]:
     """What conditions of events compare with zero, where they hold at the zero itself."""
     asked = {o.name: o.expression for o in network.observations if not o.stored}
     compared = [n for e in network.events if e.condition is not None for n in ex.topological([e.condition])]
@@ -316,12 +324,15 @@ def default_output(file: str, scene: str, end: str = ".h5") -> str:
 def _attributes(target: Target, prepared: Prepared) -> dict[str, str]:
     """What the trace says of itself, asked once a text."""
     if "attributes" not in prepared.layouts:
-        prepared.layouts["attributes"] = _said(target, prepared)
+        prepared.layouts["attributes"] = _trace_attributes(target, prepared)
     return prepared.layouts["attributes"]
 
 
-def _said(target: Target, prepared: Prepared) -> dict[str, str]:
-    left_out = {"pruned": listed(prepared.left_out)} if prepared.left_out else {}
+def _trace_attributes(target: Target, prepared: Prepared) -> dict[str, str]:
+    """Attributes of the trace that say what it is of: conventions, model, scene, formulation, digest, what was left
+    out.
+    """
+    left_out = {"pruned": list_removals(prepared.left_out)} if prepared.left_out else {}
     return {
         "Conventions": "CF-1.11",
         "title": target.name,
@@ -343,11 +354,13 @@ def parameters_of(prepared: Prepared) -> Iterator[Parameter]:
     """Parameters in SI units, arrays element by element (`m[2]`); arrays of more than LISTED elements are left out."""
     evaluate, values = prepared.binding.evaluate, prepared.binding.values
     units = prepared.layouts.setdefault("units of parameters", {})
+    # once for a prepared model: runs of sweeps share them
     if not units:
         shown = (p for p in prepared.network.parameters if not p.name.startswith("#"))  # none that the compiler made
         own = (p for p in shown if p.name not in prepared.network.discretes)
         units |= {p.name: (p.shape, si_text(p.unit.dimension)) for p in own}
     for name, (shape, unit) in units.items():
+        # a scalar
         if not shape:
             yield Parameter(name, float(values[name]), unit)
             continue

@@ -129,6 +129,7 @@ def _stale(held: Mapping[str, Any], target: Target, version: str) -> str:
 
 
 def _scene(held: Mapping[str, Any], target: Target) -> Lock | None:
+    """The lock of a scene; None where there is none, ValueError where it names what there is not."""
     said = held.get("scene", {}).get(target.scene.name.name if target.scene else "")
     if said is None:
         return None
@@ -146,7 +147,7 @@ def _scene(held: Mapping[str, Any], target: Target) -> Lock | None:
     return found
 
 
-def taken(
+def settings_from_lock(
     lock: Lock,
     target: Target,
     formulation: str | None,
@@ -155,19 +156,23 @@ def taken(
     levels: tuple[tuple[str, str], ...],
 ) -> Taken:
     """What is left of a lock beside the command line and the scene; nothing where that names another level."""
+    # another level was asked for: nothing measured holds
     if any(dict(levels).get(path, name) != name for path, name in lock.levels):
         return Taken(None, None, None, (), None, lock.accuracy, "")
     body = target.scene.body if target.scene else ()
     scene = next((s.name.name for s in body if isinstance(s, syntax.Formulation)), None)
     solver = next((s for s in body if isinstance(s, syntax.Solver)), None)
+    # what the command line and the scene say already
     here = formulation or scene
     same = here in (None, lock.formulation)
     by_scene = any(a.name == "index" for a in (solver.args or ())) if solver else False
+    # index, method and tolerance were measured together: all of them or none
     both = same and index in (None, lock.index) and method in (None, lock.method)
     both = both and not by_scene and (solver is None or method is not None)
     source = target.document.file.source
     said = [_path(source, s.target) for s in body if isinstance(s, syntax.SceneLevel)]
     above = {*(path for path, _ in levels), *said}
+    # levels that nobody names
     rest = tuple((path, name) for path, name in lock.levels if path not in above)
     parts = [f"formulation {lock.formulation}"] if here is None else []
     parts += [f"index {lock.index}", f"method {lock.method}", f"tolerance {lock.tolerance:g}"] if both else []
@@ -215,6 +220,7 @@ def write(file: str, target: Target, lock: Lock, version: str) -> Path:
 
 
 def _text(files: Mapping[str, str], version: str, scenes: Mapping[str, Mapping[str, Any]]) -> str:
+    """Text of the lock file."""
     lines = ["# Written by sysdyn trade --lock, read by sysdyn simulate; out of date once a file below changes."]
     lines += [f"version = {FORMAT}", f"sysdyn = {toml_text(version)}", "", "[files]"]
     lines += [f"{toml_text(name)} = {toml_text(value)}" for name, value in files.items()]

@@ -38,13 +38,16 @@ def wrong_numbers(target: Target, network: Network, value: Value, request: Reque
     scene = network.scene
     assert scene is not None
     yield from _span(target, scene, value, until=request.until is not None)
+    # claims at instants beyond the end
     if request.until is None:
         yield from _claims(scene, network.expectations, value)
+    # accuracies of the scene, unless the command line has one
     said = () if request.accuracy is not None else (scene.accuracy, *(node for _, node in scene.accuracy_on))
     for wanted in dict.fromkeys(value(node) for node in said if node is not None):
         if not FINEST_ACCURACY <= wanted < 1.0:
             text = f"accuracy {wanted:g}: from {FINEST_ACCURACY:g} to less than 1, what double precision can tell"
             yield Diagnostic("E906", text, _place(target, scene, syntax.Accuracy), "accuracy 1e-6")
+    # limits are whole numbers
     for name, node in scene.limits:
         most = value(node)
         if not (math.isfinite(most) and round(most) >= 1):
@@ -59,9 +62,11 @@ def _span(target: Target, scene: Scene, value: Value, *, until: bool) -> Iterato
         return
     t0, t1 = value(scene.start), value(scene.end)
     right = math.isfinite(t0) and math.isfinite(t1) and t1 > t0
+    # backwards, or never ending
     if not (until or right):
         text = f"the time is from {t0:g} s to {t1:g} s: a run goes forward and ends"
         yield Diagnostic("E912", text, _place(target, scene, syntax.Time), "time 0 s to 10 s")
+    # instants that doubles do not tell apart
     elif not until and (text := beyond(t0, t1)):
         yield Diagnostic("E912", text, _place(target, scene, syntax.Time), "time 0 s to 10 s")
         return
@@ -69,6 +74,7 @@ def _span(target: Target, scene: Scene, value: Value, *, until: bool) -> Iterato
     if every is None or not (right or until):
         return
     place = _place(target, scene, syntax.Trace, lambda s: s.every is not None, lambda s: s.every.span)
+    # the interval of the trace
     if not every > 0.0:
         yield Diagnostic("E912", f"the interval of the trace is {every:g} s: it is positive", place, "every 10 ms")
     elif not until and (t1 - t0) / every > INSTANTS:
@@ -102,23 +108,28 @@ def _solver(target: Target, scene: Scene, value: Value, request: Request) -> Ite
     """The options of the solver, and the step that one of them needs."""
     said = {name: value(node) for name, node in scene.solver_options}
     place = _place(target, scene, syntax.Solver)
+    # lengths of time are positive
     for name in ("step", "longest"):
         if not said.get(name, 1.0) > 0.0:
             text = f"{name} = {said[name]:g} s of the solver: it is positive"
             yield Diagnostic("E912", text, place, f"{name} = 1 ms")
+    # forms that there are
     if request.index is None and said.get("index", 0.0) not in _INDICES:
         yield Diagnostic("E607", f"index = {said['index']:g} of the solver", place, "index = 0, 1, 2, 2v, 3")
+    # orders of the method
     orders = _ORDERS.get(scene.solver or "", ())
     if request.method in (None, scene.solver) and "order" in said and said["order"] not in orders:
         text = f"order = {said['order']:g} of the solver {scene.solver}"
         yield Diagnostic("E607", text, place, "bdf(order = 1 .. 5): at most; radau(order = 5), 9 or 13: that one")
     method = request.method or scene.solver or "auto"
+    # the one method that needs a step
     if method == "euler":
         if request.method is None and request.step is None and "step" not in said:
             yield Diagnostic("E607", "method euler needs a step", place, "solver euler(step = 1 ms)")
         if said.get("step", 0.0) > said.get("longest", math.inf):
             text = f"step = {said['step']:g} s of the solver is longer than longest = {said['longest']:g} s"
             yield Diagnostic("E607", text, place, "euler takes steps of one length: step alone")
+    # others choose theirs
     elif "step" in said and request.method is None:
         text = f"step = {said['step']:g} s of the solver {method}, which chooses its steps"
         yield Diagnostic("E607", text, place, f"{method}(longest = ..) bounds them; euler(step = ..) has one length")

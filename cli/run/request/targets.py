@@ -52,11 +52,13 @@ def files(given: Iterable[str]) -> list[str]:
     found: dict[str, None] = {}
     for name in given:
         path = Path(name)
+        # all models below a folder, hidden ones left out
         if name != "-" and path.is_dir():
             inside = [p for p in sorted(path.rglob("*.sd")) if not _hidden(p.relative_to(path))]
             if not inside:
                 raise UsageError(f"there is no .sd file in the folder {name}")
             found |= dict.fromkeys(map(str, inside))
+        # a pattern that the shell did not expand
         elif any(sign in name for sign in "*?[") and not path.exists():
             fitting = sorted(glob.glob(name, recursive=True))  # noqa: PTH207 (a pattern may be absolute)
             if not fitting:
@@ -88,6 +90,7 @@ def one(document: Document, path: str, model: str | None, scene: str | None, rep
 
     UsageError with the list where there are several and none is named.
     """
+    # the scene tells the model
     if scene is not None:
         found = document.scenes.get(scene)
         if found is None:
@@ -100,21 +103,23 @@ def one(document: Document, path: str, model: str | None, scene: str | None, rep
         return Target(document, owner, found)
     if model is not None and model not in document.models:
         raise _nothing(document, path, "model", model, list(document.models), report)
+    # the only scene, of the model that is named
     scenes = [s for s in document.scenes.values() if model is None or s.model.names == (model,)]
     if len(scenes) == 1:
         return one(document, path, model, scenes[0].name.name, report)
+    # several: the author says which
     if scenes:
         raise UsageError(f"{path} has several scenes: --scene {' | '.join(s.name.name for s in scenes)}")
     return whole(document, path, model, None, report)
 
 
-def asked(request: Request, report: Report, choose: Callable[..., Target | None] = one) -> Target | None:
+def target_of(request: Request, report: Report, choose: Callable[..., Target | None] = one) -> Target | None:
     """What a request means of its file, by `one`, `still` or `whole`."""
     document = read(request.file, report, request.text)
     return choose(document, request.file, request.model, request.scene, report)
 
 
-def held(request: Request, target: Target) -> Request:
+def with_text(request: Request, target: Target) -> Request:
     """The request for other processes: what stood on standard input is read once."""
     return replace(request, text=target.document.file.source.text if request.file == "-" else None)
 
@@ -130,10 +135,12 @@ def whole(document: Document, path: str, model: str | None, scene: str | None, r
 
     None where its text has errors; UsageError with the list where there are several models and none is named.
     """
+    # with its scene
     if scene is not None:
         return one(document, path, model, scene, report)
     if model is not None and model not in document.models:
         raise _nothing(document, path, "model", model, list(document.models), report)
+    # the only model
     names = [model] if model is not None else list(document.models)
     if len(names) == 1:
         return Target(document, document.models[names[0]], None)
@@ -144,7 +151,7 @@ def whole(document: Document, path: str, model: str | None, scene: str | None, r
     raise UsageError(f"{path} has no model")
 
 
-def unsupported(found: Iterable[Diagnostic]) -> Iterator[Diagnostic]:
+def refuse_unsupported(found: Iterable[Diagnostic]) -> Iterator[Diagnostic]:
     """The findings where a run is asked of a text that cannot be run yet: what N608 notes is then the error E608."""
     help_ = "leave it out of what is run; 'check' passes texts that are ahead of the compiler"
     return (replace(d, code="E608", help=d.help or help_) if d.code == "N608" else d for d in found)

@@ -44,57 +44,70 @@ def inconsistent(
 ) -> None:
     """Report why there is no start; until: `time.monotonic()` at which no more is tried."""
     where = place_of(prepared, error.rows[0]) if error.rows else prepared.network.place
-    names = ", ".join(dict.fromkeys(_shown(r) for r in error.rows)) or ", ".join(error.names)
+    names = ", ".join(dict.fromkeys(_row_text(r) for r in error.rows)) or ", ".join(error.names)
     fixed_at = dict.fromkeys(place_of(prepared, c) for c in error.candidates)  # a line may fix several
     related = [Related("this value is fixed", place) for place in fixed_at]
+    # a place that the author can change comes first
     if where.source is not prepared.network.place.source and related:  # the law of an element of a library
         related, where = [*related[1:], Related(f"the law of {names}", where)], related[0].place
     elif where == prepared.network.place and related:  # a row of no statement: what is fixed twice
         related, where = related[1:], related[0].place
     match error.kind:
+        # the gammas alone have no solution there
         case "gamma":
             left = f"the residual cannot fall below {_residual(error)}"
             report.error("E519", f"gamma '{names}' has no solution at the start: {left}", where, related=related)
+        # their slope in an unknown vanishes
         case "implicit":
             report.error("E505", f"the gammas do not determine {', '.join(error.names)} at the start", where)
+        # a law without slope, by which the start cannot be found
         case "slope":
             report.error("E903", f"no start: {no_slope(by_element(prepared, error.rows))}", where, help=WITH_A_SLOPE)
         case "nonfinite" if not names:
             message = "the equations are no numbers at the start: products or quotients beyond 1e308?"
             sizes = "look at the sizes of parameters and initial values"
             report.error("E519", message, prepared.network.place, help=sizes)
+        # something is no number at the guesses
         case "nonfinite":
             message = f"{names} is not a number at the initial values: a root or logarithm out of its range?"
             report.error("E519", message, where)
+        # a parameter of zero that makes it impossible
         case _ if zero := _zero(prepared, t0, until):
             said = f"with {zero.name} = {quantity(0.0, zero.unit)} there is no start"
             left = f"{_residual(error)} is left over in {names}"
-            free = f", or '~' for '=' of {_listed(prepared, error)}" if error.candidates else ""
+            free = f", or '~' for '=' of {_fixed_values(prepared, error)}" if error.candidates else ""
             here = [Related("this is left over", where), *related]
             report.error("E903", f"{said}: {left}", zero.place, help=f"{zero.name} other than zero{free}", related=here)
+        # fixed values of which one has to be freed
         case _ if error.candidates:
             message, help_ = _contradicting(prepared, error, names)
             report.error("E903", message, where, help=help_, related=related)
+        # an initial value against constraints
         case "fixed" if any(row.kind == "initial" for row in error.rows):
             message = f"an initial value contradicts the constraints: residual {_residual(error)}"
             report.error("E903", message, where, help="the value that they leave, or '~' for '='")
+        # one row that no guess near it meets
         case "fixed" if len({row.label for row in error.rows}) == 1:  # nothing contradicts it
             message = f"no start was found near the guesses: {_residual(error)} is left over in {names}"
             help_ = "a guess, 0 where none is written, from which it can be reached: coord x: translation ~ 1 m"
             report.error("E510", message, where, help=f"{help_}; or correct it")
+        # constraints against each other
         case "fixed":
             left = _residual(error)
             report.error(
                 "E510", f"the constraints contradict each other at the start: residual {left} in {names}", where
             )
+        # contacts that can neither hold nor be open
         case _ if not np.isfinite(error.residual):
             message = f"no start fits: what holds would let go at once, and hold at once where it does not: {names}"
             there = next((s.place for s in prepared.network.switches if s.name in error.names), where)
             report.error("E903", message, there, help="initial values of all that it ties: init ... = ...")
+        # no number wherever it was tried
         case _ if not names:
             message = "no start was found: wherever it was sought the equations are no numbers"
             help_ = "a guess of what stands below a division, in a root, a logarithm or an exponential: init ... ~ ..."
             report.error("E903", message, where, help=help_)
+        # what is left over, with the nearest remedy
         case _:
             message = f"no consistent start was found: {error.residual:.3g} of the terms is left over in {names}"
             report.error("E903", message, where, help=_nearer(prepared, error))
@@ -102,7 +115,7 @@ def inconsistent(
 
 def _contradicting(prepared: Prepared, error: InconsistentStart, names: str) -> tuple[str, str]:
     """Fixed values that contradict each other, or rows (names); what may be freed."""
-    fixed = _listed(prepared, error)
+    fixed = _fixed_values(prepared, error)
     left = f"{names}: residual {_residual(error)}"
     own = {r.label.rstrip("'") for r in error.rows} <= {c.label.rstrip("'") for c in error.candidates}
     itself = own and all(not r.file for r in error.rows)
@@ -128,7 +141,7 @@ def _nearer(prepared: Prepared, error: InconsistentStart) -> str:
     return help_ if one is None else f"{given}; else {help_}"
 
 
-def _shown(row: RowLabel) -> str:
+def _row_text(row: RowLabel) -> str:
     """A row by its name; what an `init` says of an expression has none."""
     return f"the value at line {row.line}" if row.label == row.kind == "initial" and row.line else row.label
 
@@ -142,7 +155,7 @@ def _without_inertia(prepared: Prepared, name: str) -> bool:
     return all(n.op != "var" or n.data[0] != name for root in kinetic for n in variables(root))
 
 
-def _listed(prepared: Prepared, error: InconsistentStart) -> str:
+def _fixed_values(prepared: Prepared, error: InconsistentStart) -> str:
     """The fixed values to free, as the author writes them: `x'`, and `shaft.f` of a node or an element."""
     places = [place_of(prepared, c) for c in error.candidates]
     names = names_of(prepared.network, (c.label for c in error.candidates))

@@ -26,6 +26,7 @@ def impossible(prepared: Prepared, error: NoSuchForm) -> tuple[str, tuple[RowLab
 
 
 def _laws(prepared: Prepared, row: RowLabel) -> Iterator[RowLabel]:
+    """Laws that bend in the flow of a row's owner: works, and contents by their derivative."""
     owner, bracket, index = row.label.partition("[")
     network = prepared.compiled.network
     said: list[tuple[Node, Place]] = [(w.effort, w.place) for w in network.works]

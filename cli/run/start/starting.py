@@ -61,34 +61,40 @@ def start(
     """
     found = Report()
     try:
-        return _started(prepared, t0, found, redundancy, until)
+        return _find_start(prepared, t0, found, redundancy, until)
     finally:
         report.extend(load.at_authors(prepared.network, found))
 
 
-def _started(
+def _find_start(
     prepared: Prepared, t0: float, report: Report, redundancy: str | None, until: float | None
 ) -> Started | None:
+    """Find the consistent start and its structure, report what is wrong of it; None where there is none."""
     scene = prepared.network.scene
     policy = redundancy or (scene.redundancy if scene else None) or "error"
     system = System.of(describe(prepared.structure, prepared.arrays), prepared.carrier, "3")
+    # the start, then ranks and index there
     try:
         with np.errstate(all="ignore"):  # what overflows is seen as no number
             state = eventful_start(system, t0, plan(prepared, system), Budget(until))
             facts = structure(system, state)
             implicit = undetermined(system, state, facts)
+    # a function that is no number explains more than the residual
     except InconsistentStart as error:
-        if error.kind != "nonfinite" or not _undefined(prepared, system, t0, report):
-            _refused(prepared, t0, error, report, until)
+        if error.kind != "nonfinite" or not _report_undefined(prepared, system, t0, report):
+            _report_refusal(prepared, t0, error, report, until)
         return None
+    # laws that are too steep at the guesses
     except NotFiniteError:
         _steep(prepared, system, t0, report)
         return None
+    # the limit of time
     except SolverFailure:
         _late(prepared, "while the start is sought", "a higher limit, or guesses nearer to a start", report)
         return None
     _structural(prepared, system, state, facts if not implicit else replace(facts, undetermined=()), policy, report)
     _inertia(prepared, system, state, report)
+    # unknowns that the gammas leave open
     for name in implicit:
         place = next(
             (u.place for u in prepared.network.unknowns if u.name == name.partition("[")[0]), prepared.network.place
@@ -107,7 +113,9 @@ def _late(prepared: Prepared, when: str, remedy: str, report: Report) -> None:
     report.error("E934", text, prepared.network.place, help=remedy)
 
 
-def _refused(prepared: Prepared, t0: float, error: InconsistentStart, report: Report, until: float | None) -> None:
+def _report_refusal(
+    prepared: Prepared, t0: float, error: InconsistentStart, report: Report, until: float | None
+) -> None:
     """Report why there is no start; of gathered elements at the lines of the author, as `compile_network` does."""
     if prepared.compiled.written is not None:
         found = Report()
@@ -138,28 +146,30 @@ def as_written(prepared: Prepared, t0: float) -> tuple[Prepared, Started] | None
         return None
 
 
-def moved(prepared: Prepared, state: ConsistentState) -> list[Moved]:
+def changes_by_start(prepared: Prepared, state: ConsistentState) -> list[Moved]:
     """What the start moved, by the author's names."""
     names = names_of(prepared.network, (name for name, *_ in state.moved))
     return [(name, before, after, why) for name, (_, before, after, why) in zip(names, state.moved, strict=True)]
 
 
-def described(prepared: Prepared, state: ConsistentState) -> list[str]:
-    """The same, a line each."""
-    return [f"{name}: {before:.6g} -> {after:.6g}, {why}" for name, before, after, why in moved(prepared, state)]
+def change_lines(prepared: Prepared, state: ConsistentState) -> list[str]:
+    """What the start moved, a line each."""
+    return [
+        f"{name}: {before:.6g} -> {after:.6g}, {why}" for name, before, after, why in changes_by_start(prepared, state)
+    ]
 
 
-def sought(state: ConsistentState) -> str:
+def strategy_note(state: ConsistentState) -> str:
     """How the start was found, where Newton's method from the guesses was not enough; else nothing."""
     return SOUGHT.get(state.strategy, "") and f"the start was found {SOUGHT[state.strategy]} ({state.strategy})"
 
 
-def shortened(lines: list[str]) -> list[str]:
+def first_lines(lines: list[str]) -> list[str]:
     """The first few of many lines."""
     return lines if len(lines) <= 6 else [*lines[:5], f"... {len(lines) - 5} more of these"]
 
 
-def _undefined(prepared: Prepared, system: System, t0: float, report: Report) -> bool:
+def _report_undefined(prepared: Prepared, system: System, t0: float, report: Report) -> bool:
     """Whether a function is no number at the start, which is told (E519)."""
     from sysdyn.cli.run.verdict.culprit import undefined_at_start  # of mistakes alone
 
@@ -172,7 +182,7 @@ def _undefined(prepared: Prepared, system: System, t0: float, report: Report) ->
 
 def _steep(prepared: Prepared, system: System, t0: float, report: Report) -> None:
     """E519: the rows at the start, or their slopes, are no numbers."""
-    if _undefined(prepared, system, t0, report):
+    if _report_undefined(prepared, system, t0, report):
         return
     message = "the slopes of the equations are no numbers at the start: values beyond 1e308, or a root at zero?"
     report.error("E519", message, prepared.network.place, help="look at the sizes of parameters and initial values")
@@ -181,6 +191,8 @@ def _steep(prepared: Prepared, system: System, t0: float, report: Report) -> Non
 def _structural(
     prepared: Prepared, system: System, state: ConsistentState, facts: Structure, policy: str, report: Report
 ) -> None:
+    """Report a singular configuration (E512), redundant constraints (E509) and what is undetermined (E516)."""
+    # a rank that is larger nearby: a dead centre
     if facts.singular:
         near = facts.rank
         message = f"the initial configuration is singular: rank {near - facts.singular}, {near} nearby"
@@ -188,6 +200,7 @@ def _structural(
         message += f": {', '.join(c.name for c in lost)} depend on each other there" if lost else ""
         where = lost[-1].place if lost else prepared.network.place
         report.error("E512", message, where, help="move the guess off the dead centre")
+    # the author asked to drop or to keep them
     if facts.redundant and policy != "error":
         return
     if facts.redundant:
@@ -200,6 +213,7 @@ def _structural(
         plural = "s" if facts.redundant > 1 else ""
         message = f"{facts.redundant} redundant constraint{plural}: dependent group {group}"
         report.error("E509", message, where, related=beside)
+    # no index: something has neither inertia nor a law
     elif facts.index is None and facts.undetermined and not facts.singular:  # a singular one does not tell multipliers
         names = ", ".join(f"'{n}'" for n in facts.undetermined[:5])
         message, help_ = f"the equations do not determine {names}", "inertia, stiffness, dissipation or a constraint"
@@ -258,6 +272,7 @@ def _statics(prepared: Prepared, system: System, state: ConsistentState, facts: 
 
     Claims of a model hold in each of its scenes: where there is a Lagrangian formulation, that is counted.
     """
+    # claims are of the whole model, with what the scene left out
     if prepared.left_out and prepared.network.statics:
         written = as_written(prepared, state.t)
         if written is None:
@@ -266,10 +281,12 @@ def _statics(prepared: Prepared, system: System, state: ConsistentState, facts: 
             return
         prepared, (system, state, facts) = written[0], (written[1].system, written[1].state, written[1].facts)
     index = facts.index
+    # counted in Lagrange's form where there is one
     primal = _primal(prepared, state.t) if prepared.network.statics and _without_primal_rows(prepared) else None
     if primal is not None:
         prepared, (system, state, facts) = primal[0], (primal[1].system, primal[1].state, primal[1].facts)
     known = facts.counts | {"index": index}
+    # order and manifold are computed where somebody asks
     if any(n.data in ("static order", "static manifold") for c in prepared.network.statics for n in _names(c)):
         model = prepared.compiled.energies
         idle = {c.name for c in model.coordinates if not c.tangible} | {s.name for s in model.states if s.measured}
@@ -304,6 +321,7 @@ def _names(claim: Expectation) -> list[ex.Node]:
 
 
 def _static(prepared: Prepared, claim: Expectation, known: dict[str, int | None], report: Report) -> None:
+    """Judge one claim about counts: E909 where it fails, N608 where the count is not known."""
     missing = []
 
     def lookup(node: ex.Node) -> float:
@@ -332,7 +350,7 @@ def holds(operator: str, left: float, right: float, within: float) -> bool:
 
 
 def where_holds(operator: str, left: Any, right: Any, within: Any) -> Any:
-    """The same of arrays, sample by sample."""
+    """Where relations of arrays hold, sample by sample."""
     match operator:
         case "==":
             return np.abs(left - right) <= within

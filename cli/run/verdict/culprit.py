@@ -47,17 +47,20 @@ def culprit(prepared: Prepared, system: System, error: SolverFailure) -> Culprit
     oracle = Oracle(prepared.compiled.form, prepared.binding)
     blocks = [b for b in prepared.compiled.form.blocks if b.name not in (*WITHOUT_ENTRIES, "initial")]
     rates = np.where(np.isfinite(yd), yd, 0.0)
+    # a little ahead along the rates, by parts of the step and by some roundings
     times = (*(s * error.step for s in STEPS), *(a * max(abs(t), error.step) for a in AHEAD))
     with np.errstate(over="ignore"):  # a last state at the end of all numbers
         points = [(t + ahead, y + ahead * rates, yd) for ahead in times]
+    # beside the state, as an iterate may have been
     if error.cause == "nonfinite":  # it has been met: by an iterate, if no rate leads there
         points += [(t, y + side * np.maximum(np.abs(y), 1.0), yd) for side in BESIDE]
+    # the nearest point first
     for point in points:
         for block in blocks:
-            found = oracle.undefined(block.name, *point, infinite=error.cause == "nonfinite")
+            found = oracle.find_undefined(block.name, *point, infinite=error.cause == "nonfinite")
             if found is not None:
                 last.time, last.y = point[0], point[1]
-                return _told(prepared, *found, last)
+                return _describe(prepared, *found, last)
     return None
 
 
@@ -69,25 +72,28 @@ def undefined_at_start(prepared: Prepared, system: System, t: float) -> tuple[st
         if block.name in (*WITHOUT_ENTRIES, "initial"):
             continue
         with np.errstate(all="ignore"):
-            found = oracle.undefined(block.name, t, y, np.zeros_like(y))
+            found = oracle.find_undefined(block.name, t, y, np.zeros_like(y))
         if found is not None:
-            told = _told(prepared, *found, LastState(prepared, system, t, y))
+            told = _describe(prepared, *found, LastState(prepared, system, t, y))
             place = _statement(prepared, found[1]) or prepared.compiled.form.rows[found[0]].place
             return told.text, place or prepared.network.place
     return None
 
 
-def _told(prepared: Prepared, row: int, node: Node, arguments: list[float], last: LastState) -> Culprit:
+def _describe(prepared: Prepared, row: int, node: Node, arguments: list[float], last: LastState) -> Culprit:
+    """The finding on an operation that is no number, with the values that it read."""
     place = _statement(prepared, node) or prepared.compiled.form.rows[row].place
     label = RowLabel(place.element if place else "", "law", place.file if place else "", place.start[0] if place else 0)
     listed = ", ".join(f"{a:.9g}" for a in arguments)
-    read = ", ".join(last.of(node)[:3])
+    read = ", ".join(last.values_read(node)[:3])
+    # beyond the range of a table that stops
     if node.op == "table":
         name = str(node.data[0]).partition(RANGE)[0]
         said = f"the argument of table {name} left its range: it is {read or listed}"
         return Culprit("E932", said, label)
     text = to_text(node)
     function = re.match(r"\w+(?=\()", text)
+    # a function as it is written, with its argument
     if function is not None and len(arguments) <= 2:
         written = _written(place, function[0])
         values = f"its argument is {arguments[0]:.3g}" + (f", {read}" if read else "")

@@ -49,7 +49,8 @@ def watch(prepared: Prepared) -> Watch:
         judged = [(k, e) for k, e in claims if f"expect {k} left" in column]
         worst = {k: -1.0 for k, e in judged if e.moment == "always"}
 
-        def wanted(time: Floats, values: Floats) -> NDArray[np.bool_]:
+        # rows at the instants of claims, and those that break an `always` worse than before
+        def rows_to_keep(time: Floats, values: Floats) -> NDArray[np.bool_]:
             kept = np.zeros(time.size, dtype=bool)
             for k, e in judged:
                 if e.at is not None:
@@ -62,7 +63,7 @@ def watch(prepared: Prepared) -> Watch:
                             kept[row], worst[k] = True, float(off[row]) if e.operator in LOOSE else np.inf
             return kept
 
-        return wanted
+        return rows_to_keep
 
     return of_run
 
@@ -79,12 +80,15 @@ def judge(prepared: Prepared, outcome: Outcome, report: Report, *, finished: boo
 
 
 def _claim(prepared: Prepared, outcome: Outcome, k: int, e: Expectation, report: Report, finished: bool) -> Claim:
+    """Judge one claim on the rows that were kept; not known where the run did not come that far."""
     text = e.text.removeprefix("expect ")
     time, left, right, within = _sides(outcome, k, e)
+    # at the last row
     if e.moment == "finally":
         if not finished:
             return Claim(text, None, None, None)
         time, left, right, within = time[-1:], left[-1:], right[-1:], within[-1:]
+    # at its instant
     elif e.at is not None:
         at = prepared.binding.evaluate(e.at)
         here = np.flatnonzero(_near(time, at))
@@ -95,6 +99,7 @@ def _claim(prepared: Prepared, outcome: Outcome, k: int, e: Expectation, report:
             return Claim(text, False, None, at)
         time, left, right, within = time[here[:1]], left[here[:1]], right[here[:1]], within[here[:1]]
     open_ = _open(outcome, k, e)
+    # always: the first row that breaks it
     for t, a, b, w in zip(time, left, right, within, strict=True):
         if not holds(e.operator, a, b, w + open_):
             _report(outcome, e, (t, a, b, w), report)
@@ -121,6 +126,7 @@ def _golden(prepared: Prepared, outcome: Outcome, golden: Golden, report: Report
     """`expect golden "F" within r`: the quantities that F also has, by the comparison of `sysdyn diff`."""
     text = f'golden "{golden.file}"'
     path = _place_of(golden)
+    # a file that is not there
     if missing := missing_goldens((golden,), "E907"):
         report.extend(missing)
         return Claim(text, None, None, None)
@@ -132,6 +138,7 @@ def _golden(prepared: Prepared, outcome: Outcome, golden: Golden, report: Report
 
     within = prepared.binding.evaluate(golden.within)
     try:
+        # quantities of both
         with Recorded(path) as reference, _file(outcome) as file, Recorded(file) as trace:
             names = set(reference.quantities) & set(trace.quantities)
             tube = Tolerance(rtol=within, tau=reference.tau)
@@ -191,6 +198,7 @@ def _meters(e: Expectation) -> str:
 
 
 def _report(outcome: Outcome, e: Expectation, worst: tuple[float, float, float, float], report: Report) -> None:
+    """E909 of a claim that failed, with the tolerance or accuracy that would decide it."""
     t, a, b, w = worst
     unit = "" if e.unit.text == "1" else f" {e.unit.text}"
     off = abs(a - b)
@@ -201,8 +209,10 @@ def _report(outcome: Outcome, e: Expectation, worst: tuple[float, float, float, 
     estimate = outcome.error_estimate
     help_ = None
     size = max(abs(a), abs(b))
+    # equality to the last bit
     if e.operator == "==" and e.within is None:
         help_ = f"'==' without 'within' asks for the last bit: within {off:.1g}{unit} would hold"
+    # off by less than the error of the run
     elif estimate and size > 0.0 and off - w < estimate * size:
         wanted = max((off - w) / size / 10.0, 1e-13)
         less = f"this is less than the estimated error of the run ({estimate:.1g})"

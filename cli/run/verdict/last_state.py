@@ -45,7 +45,7 @@ class LastState:
             (f.owner, f.kind): int(first) for f, first in zip(system.description.families, system.form.at, strict=False)
         }
 
-    def shown(self, k: int) -> str:
+    def value_text(self, k: int) -> str:
         """`x' = 4 m/s`."""
         unit = self.system.description.families[int(self.system.family_of[k])].unit
         return f"{self.name(k)} = {self.y[k]:.6g}{'' if unit == '1' else f' {unit}'}"
@@ -63,14 +63,14 @@ class LastState:
         names = self.system.unknown_names
         return [k for k in range(number) if self.system.kinds[k] in STATE and RANGE not in names[k]]
 
-    def listed(self) -> str:
+    def some_values(self) -> str:
         """A few unknowns."""
-        return ", ".join(self.shown(k) for k in self.states()[:SHOWN])
+        return ", ".join(self.value_text(k) for k in self.states()[:SHOWN])
 
-    def of(self, node: Node) -> list[str]:
+    def values_read(self, node: Node) -> list[str]:
         """The unknowns that an expression reads, with their values."""
         found = (self._place(n) for n in ex.variables(node))
-        return [self.shown(k) for k in dict.fromkeys(k for k in found if k is not None)]
+        return [self.value_text(k) for k in dict.fromkeys(k for k in found if k is not None)]
 
     def _place(self, node: Node) -> int | None:
         """Where a variable without indices stands in y."""
@@ -100,13 +100,13 @@ class LastState:
         except (ArithmeticError, KeyError, ValueError, TypeError, ModelError):
             return math.nan
 
-    def grown(self, start: NDArray[np.float64]) -> str | None:
+    def unbounded_growth(self, start: NDArray[np.float64]) -> str | None:
         """The unknown that has grown beyond all bounds since the start."""
         states = self.states()
         size = np.abs(self.y[states]) / np.maximum(np.abs(start[states]), 1.0)
         if not states or not size.max() > GROWN:
             return None
-        return f"{self.shown(states[int(np.argmax(size))])} grows without bound"
+        return f"{self.value_text(states[int(np.argmax(size))])} grows without bound"
 
     def vanishing(self, start: NDArray[np.float64]) -> str | None:
         """A divisor that has nearly vanished since the start."""
@@ -120,7 +120,7 @@ class LastState:
                         what = "the argument of a logarithm" if called else "a divisor"
                         itself = base.op == "var" and self._place(base) is not None
                         value = "" if itself else f"{to_text(base)} = {now:.3g}, "
-                        return f"{what} goes to zero: {value}{', '.join(self.of(base)[:2])}"
+                        return f"{what} goes to zero: {value}{', '.join(self.values_read(base)[:2])}"
         return None
 
     def dependent(self, start: NDArray[np.float64] | None = None) -> list[Constraint]:
@@ -129,6 +129,7 @@ class LastState:
         """
         found = [c for c in self.prepared.network.constraints if c.kind in ("phi", "psi") and not c.loops]
         names = [c.name for c in self.prepared.network.coordinates if not c.shape]
+        # arrays and large models are not judged
         if not 0 < len(found) <= MANY or not 0 < len(names) <= MANY:
             return []
 
@@ -136,6 +137,7 @@ class LastState:
             by = {"phi": [[ex.var(n, "q")] for n in names]}
             by["psi"] = [[ex.var(n, "q", order=1), ex.var(n, "f")] for n in names]
             rows = [[sum(self.value(derivative(c.expression, v), y) for v in vs) for vs in by[c.kind]] for c in found]
+            # normed gradients: their smallest singular value tells the distance from dependence
             j = np.array(rows)
             return np.asarray(j / np.maximum(np.linalg.norm(j, axis=1, keepdims=True), 1e-300))
 
@@ -147,6 +149,7 @@ class LastState:
         before = 1.0 if start is None else decomposed(gradients(start))[1][-1]
         if not least < LOST * before:
             return []
+        # the constraints that take part in the combination
         weights = np.abs(left[:, -1])
         return [c for c, w in zip(found, weights, strict=True) if w > 0.1 * weights.max()]
 
@@ -161,12 +164,14 @@ class LastState:
         """The energy, work or dynamic that drives an unknown the most; None where none is known to."""
         base = re.sub(r"\[.*", "", unknown.removesuffix("'"))
         network = self.prepared.network
+        # a state has its own dynamic
         for d in network.dynamics:
             if d.state.data[0] == base:
                 return d.place
         position = ex.var(base, "q")
         moves = (position, ex.var(base, "q", order=1), ex.var(base, "f"))
         found: list[tuple[float, Place]] = []
+        # the size of what each statement contributes
         for e in network.energies:
             if not e.loops:
                 found += [(abs(self.value(derivative(e.expression, v))), e.place) for v in moves]

@@ -150,7 +150,7 @@ def _knob(options: Options | None, code: str) -> str:
     return "a shorter --step" if code == "E930" else "a longer --step"
 
 
-def stopped(
+def report_stop(
     target: Target,
     prepared: Prepared,
     started: Started,
@@ -159,23 +159,28 @@ def stopped(
     options: Options | None = None,
 ) -> str:
     """Reports where the solver stopped; the sentence of it."""
+    # the cause in words, by default
     code, cause = _CAUSES.get(error.cause, ("E930", error.cause))
     asked = ("nonfinite", "newton", "step_too_small", "crawl")
     found = culprit(prepared, started.system, error) if error.cause in asked else None
+    # an operation that is no number
     if found is not None:
         code, cause = found.code, found.text
     last = None if error.state is None else LastState(prepared, started.system, *error.state[:2])
     lost = last.dependent(started.state.y) if last is not None and code == "E930" else []
+    # constraints that have become dependent
     if lost:
         code, cause = "E931", f"{', '.join(c.name for c in lost)} lose their rank: they depend on each other there"
     flat = _flat(prepared, started, error) if found is None and not lost and code in ("E930", "E931", "E933") else ()
+    # a law without slope
     if flat:
         code, cause = "E931", no_slope(flat)
     where = lost[-1].place if lost else _place(target, prepared, error, found, last)
     where = author_place(target, prepared, flat[0]) if flat else where
     text = f"the solver stopped at t = {error.time:.9g} s (step {error.step:.2g} s): {cause}"
+    # the row, or the unknown, that did not converge
     if error.row is not None and found is None and not flat:
-        text += f", in {_named(error.row)}"
+        text += f", in {_row_name(error.row)}"
     if error.unknown is not None:
         name = re.sub(r" (sticking|set)( \d+)?(?=\[|$)", "", error.unknown)
         text += f", {'of' if error.cause in _OF_EVENTS else 'unknown'} {name}"
@@ -183,11 +188,13 @@ def stopped(
     linear = error.cause == "error_test" and isinstance(partial, Outcome) and partial.method == "rosenbrock"
     text += _BY_SLOPES if linear and not flat else ""
     why = None
+    # growth beyond all bounds, or an inertia that vanishes
     if last is not None and code == "E930":
-        why = last.grown(started.state.y) or last.vanishing(started.state.y)
+        why = last.unbounded_growth(started.state.y) or last.vanishing(started.state.y)
         text += f"; {why}" if why else ""
     if isinstance(partial, Outcome) and partial.reached > error.time:
         text += "; the trace is that of a coarser run to the end, its error is not known"
+    # the remedy that fits the cause
     usual = _REMEDIES_OF_CAUSES.get(error.cause, _REMEDIES[code])
     usual = _instead_of(partial.method if isinstance(partial, Outcome) else "") if linear or flat else usual
     usual += f"; {WITH_A_SLOPE}" if flat else ""
@@ -201,7 +208,7 @@ def stopped(
         usual = dropped * _FOLLOWS + _LEFT_OUT % names
     usual = usual.replace(LOOSER, _knob(options, code))
     remedy = _BOUNDED if why else _RANK if lost else usual
-    known = f"last good state at {last.time:.9g} s: {last.listed()}" if last is not None and last.states() else ""
+    known = f"last good state at {last.time:.9g} s: {last.some_values()}" if last is not None and last.states() else ""
     help_ = "; ".join(filter(None, (remedy, known)))
     report.error(code, text, where, help=help_)
     return text
@@ -251,7 +258,7 @@ def differences(prepared: Prepared, cancelled: Iterable[Cancelled], report: Repo
         report.note("N922", text, place, help=help_)
 
 
-def unkicked(prepared: Prepared, started: Started, outcome: Outcome, report: Report) -> None:
+def note_rest(prepared: Prepared, started: Started, outcome: Outcome, report: Report) -> None:
     """N924 of a run in which nothing has moved, though what disturbs it would have grown by FOLDS powers of e."""
     system, state = started.system, started.state
     if system.unknowns > UNKICKED or moving(system, state) or (trace := outcome.traced) is None:
@@ -287,7 +294,7 @@ def verdict(target: Target, prepared: Prepared, started: Started, outcome: Outco
             flat = _flat_start(prepared, started) if outcome.method == "rosenbrock" else ()
             _inaccurate(prepared, missed, place, flat, report)
         else:
-            _unbalanced(target, prepared, missed, report)
+            _report_ledger(target, prepared, missed, report)
 
 
 def _flat_start(prepared: Prepared, started: Started) -> tuple[RowLabel, ...]:
@@ -302,20 +309,24 @@ def _inaccurate(prepared: Prepared, missed: NotMet, place: Place, flat: tuple[Ro
     """E920; flat: laws by whose slopes the method steps, and that have none at the start."""
     where = next((o.place for o in prepared.network.observations if o.name == missed.element), place)
     stops = _stops(prepared, missed.element) if missed.undefined else None
+    # a table that was left
     if stops is not None:
         text = f"the argument of table {stops}, which {missed.element} reads, left its range at t = {missed.time:.9g} s"
         report.error("E932", text, where, help=_REMEDIES["E932"])
         return
+    # no number from some instant on
     if missed.undefined:
         text = f"{missed.element} is no number from t = {missed.time:.9g} s on: a function is outside its domain"
         report.error("E920", text, where, help=_REMEDIES["E933"])
         return
+    # below round-off
     if missed.blurred:
         text = f"round-off of the unknowns that tell {missed.element} is {missed.value:.1e} of it"
         text += f", asked {missed.limit:.1e}"
         help_ = "elements that are not as small beside the others, or a formulation that has it as an unknown"
         report.error("E920", text, where, help=help_)
         return
+    # an error above what was asked
     estimate = "nothing estimates its error" if missed.value is None else f"estimated error {missed.value:.1e}"
     since = "" if missed.time is None else f", beyond it from t = {missed.time:.9g} s on"
     text = f"the accuracy asked was not reached: {missed.element}, {estimate}, asked {missed.limit:.1e}{since}"
@@ -333,7 +344,7 @@ def _stops(prepared: Prepared, quantity: str) -> str | None:
     return next((str(n.data[0]) for n in read if n.op == "table" and n.data[0] in stopping), None)
 
 
-def _unbalanced(target: Target, prepared: Prepared, missed: NotMet, report: Report) -> None:
+def _report_ledger(target: Target, prepared: Prepared, missed: NotMet, report: Report) -> None:
     assert missed.row is not None
     what = "the energy ledger" if missed.what == "energy" else "an invariant of dynamic variables"
     time = "" if missed.time is None else f" at t = {missed.time:.9g} s"
@@ -348,10 +359,10 @@ def author_place(target: Target, prepared: Prepared, row: RowLabel) -> Place:
     own = target.document.file.source
     if row.file == own.name:
         return place_at(prepared.network, row.file, row.line)
-    return _declared(target, prepared, re.split(r"[^\w]", row.label, maxsplit=1)[0])
+    return _declaration_place(target, prepared, re.split(r"[^\w]", row.label, maxsplit=1)[0])
 
 
-def _declared(target: Target, prepared: Prepared, name: str) -> Place:
+def _declaration_place(target: Target, prepared: Prepared, name: str) -> Place:
     """Where the model declares a name; the model's own place where it does not."""
     for statement in _statements(target.model.body):
         decls = (*getattr(statement, "decls", ()), getattr(statement, "decl", None))
@@ -370,28 +381,32 @@ def _statements(body: Iterable[syntax.Statement]) -> Iterable[syntax.Statement]:
 def _place(
     target: Target, prepared: Prepared, error: SolverFailure, found: Culprit | None, last: LastState | None
 ) -> Place:
+    """Where a stop is reported: the law that failed, the row, what drives the unknown, its declaration, the limit."""
     if found is not None:
         return author_place(target, prepared, found.row)
     if error.row is not None:
         return author_place(target, prepared, error.row)
     own = target.document.file.source
     driven = last.statement(error.unknown) if last is not None and error.unknown is not None else None
+    # the statement that moves it the most
     if driven is not None and driven.source is own and error.cause not in _OF_EVENTS:
         return driven
     if error.unknown is not None and error.cause not in _OF_EVENTS:
-        return _declared(target, prepared, re.split(r"[^\w]", error.unknown, maxsplit=1)[0])
+        return _declaration_place(target, prepared, re.split(r"[^\w]", error.unknown, maxsplit=1)[0])
     said = [s.place for s in prepared.network.switches if s.name == error.unknown]
     said += [e.place for e in prepared.network.events if f"'{e.name}'" in (error.unknown or "")]
+    # an event or a contact
     if said and error.cause in _OF_EVENTS:
         label = re.split(r"[^\w]", str(error.unknown), maxsplit=1)[0]
-        return said[0] if said[0].source is own else _declared(target, prepared, label)
+        return said[0] if said[0].source is own else _declaration_place(target, prepared, label)
+    # a limit of the scene
     if error.cause in ("max_steps", "max_wall", "max_events") and target.scene is not None:
         limits = [s for s in target.scene.body if isinstance(s, syntax.Limit) and error.cause == f"max_{s.name.name}"]
         return Place(own, limits[0].span if limits else target.scene.name.span)
     return prepared.network.place
 
 
-def _named(row: RowLabel) -> str:
+def _row_name(row: RowLabel) -> str:
     """The row, or the element, by its name."""
     kind = "" if row.kind[:1].isdigit() else f"{row.kind} "
     return f"{kind}{row.label}"

@@ -42,9 +42,11 @@ def broken(root: Node, tables: Mapping[str, Table], floors: Set[Node] = frozense
     for node in topological([root]):
         args = tuple(done[a] for a in node.args)
         table = tables.get(node.data[0]) if node.op == "table" else None
-        apart = table is not None and _apart(table, node)
+        apart = table is not None and _can_be_broken(table, node)
+        # one argument: conditions on it
         if table is not None and apart:
             done[node] = _pieces(table, args[0], node.data[1], floors)
+        # a grid of straight pieces in few values
         elif table is not None and len(args) > 1 and len(table.values) <= MOST:
             done[node] = _spread(table, node, args)
         else:
@@ -64,7 +66,7 @@ def _spread(table: Table, node: Node, args: tuple[Node, ...]) -> Node:
     return const(table.values[at[0] * len(table.points[1]) + at[1]])
 
 
-def _apart(table: Table, node: Node) -> bool:
+def _can_be_broken(table: Table, node: Node) -> bool:
     if len(node.args) > 1 or table.outside == "stop" or not isinstance(node.data[1], int):
         return False
     inner = topological(node.args)
@@ -74,12 +76,15 @@ def _apart(table: Table, node: Node) -> bool:
 
 
 def _pieces(table: Table, u: Node, order: int, floors: Set[Node]) -> Node:
+    """A table with its pieces written out as conditions on its argument, so that corners are operations like others."""
     points, values = table.points[0], table.values
+    # an inequality keeps the argument off that end: the end's piece is continued
     bounded = (sub(u, const(points[0])) in floors, sub(const(points[-1]), u) in floors)
     ends = [
         _end(table, k, u, order) if on else const(0.0 if order else values[k])
         for k, on in zip((0, -1), bounded, strict=True)
     ]
+    # smooth inside: its ends alone
     if table.method in ("pchip", "cubic"):
         inside = looked_up(table.name, u, order=order)
         below = conditional(compare("<", u, const(points[0])), ends[0], inside)
@@ -94,6 +99,7 @@ def _pieces(table: Table, u: Node, order: int, floors: Set[Node]) -> Node:
         last = ends[1]
     pieces = [first, *inner, last]
     found = pieces[-1]
+    # nested from the last piece to the first
     for x, piece in zip(reversed(points), reversed(pieces[:-1]), strict=True):
         found = conditional(compare("<", u, const(x)), piece, found)
     return found

@@ -17,7 +17,7 @@ from collections.abc import Mapping
 from dataclasses import replace
 
 from sysdyn.compiler.forms.corners.broken import broken
-from sysdyn.compiler.forms.corners.kinks import YES, Surface, roots, surfaces, watched
+from sysdyn.compiler.forms.corners.kinks import YES, Surface, roots, surfaces, watched_branches
 from sysdyn.compiler.forms.corners.peaks import peaks
 from sysdyn.compiler.forms.corners.written import written
 from sysdyn.compiler.forms.descriptor import (
@@ -32,7 +32,7 @@ from sysdyn.compiler.forms.descriptor import (
     Unknowns,
 )
 from sysdyn.compiler.forms.steepness import magnitude
-from sysdyn.compiler.model.mirror import lettered
+from sysdyn.compiler.model.mirror import with_family_letters
 from sysdyn.dsl.model.calculus import derivative, time_derivative
 from sysdyn.dsl.model.expression import (
     Node,
@@ -67,7 +67,7 @@ def frozen(
     """The form of a network with frozen branches, and the parameters that hold them; notes."""
     tables, place = {t.name: t for t in network.tables}, network.place
     whole, floors = form, _floors(form, network) if tables else frozenset[Node]()
-    form = replace(form, blocks=tuple(_opened(b, tables, floors) for b in form.blocks)) if tables else form
+    form = replace(form, blocks=tuple(_expand_tables(b, tables, floors) for b in form.blocks)) if tables else form
     form = written(form, network)
     found = surfaces(form, frozenset(n.data for s in network.switches for n in s.direction), floors)
     passed, notes = peaks(form, whole, network, found)
@@ -87,14 +87,14 @@ def _floors(form: DescriptorForm, network: Network) -> frozenset[Node]:
     rows = [s for kernel in (block.kernels if block else ()) if not kernel.nest for s in kernel.rows]
     found = {s.expression for s in rows if form.rows[s.row].label in gaps}
     own = (
-        {on.u for root, _ in roots(form) for n in topological([root]) if (on := watched(n)) is not None}
+        {on.u for root, _ in roots(form) for n in topological([root]) if (on := watched_branches(n)) is not None}
         if found
         else ()
     )
     return frozenset(found - {w for u in own for w in (u, neg(u))})
 
 
-def _opened(block: Block, tables: Mapping[str, Table], floors: frozenset[Node]) -> Block:
+def _expand_tables(block: Block, tables: Mapping[str, Table], floors: frozenset[Node]) -> Block:
     """A block with its tables of straight pieces written out."""
     kernels = (
         replace(k, rows=tuple(replace(s, expression=broken(s.expression, tables, floors)) for s in k.rows))
@@ -128,23 +128,23 @@ class _Freezer:
 
     def _affine(self, root: Node) -> None:
         for k, sense in enumerate(self.sense):
-            if sense is None or not any(self._of(n) == k for n in topological([root])):
+            if sense is None or not any(self._surface_number(n) == k for n in topological([root])):
                 continue
             self.done = {}
             if not is_const(derivative(derivative(self.freeze(root, held=True), sense), sense), 0.0):
                 self.sense[k] = None
         self.done = {}
 
-    def _of(self, node: Node) -> int:
+    def _surface_number(self, node: Node) -> int:
         """The number of the surface of an operation; -1 of any other."""
-        found = watched(node)
+        found = watched_branches(node)
         if found is None:
             return -1
         return self.number.get(found.u, self.number.get(neg(found.u), -1))
 
     def _kink(self, k: int, s: Surface) -> Frozen:
         row = self.before.rows[s.row]
-        text = repr(lettered(self.before.formulation, s.u))
+        text = repr(with_family_letters(self.before.formulation, s.u))
         rate = f"#rate {k}" if self._rate(k) is not None else None
         slide = (f"#above {k}", f"#below {k}") if self.sense[k] is not None else ()
         inner = any(n.op == "var" and n.data[1] in ("q", "f", "p") for n in variables(s.u))
@@ -173,27 +173,35 @@ class _Freezer:
         return self.done[branch]
 
     def _frozen(self, node: Node, held: bool) -> Node:
+        """A node whose branch is chosen by the surface's number, as it is where no surface watches it; held: by senses
+        alone.
+        """
         args = tuple(self.done[a] for a in node.args)
         live = rebuild(node, args)
+        # a condition has no surface of its own: those it reads have
         if node.op == "cond":
             return self._conditional(node, live, held)
-        k = self._of(node)
-        found = watched(node)
+        k = self._surface_number(node)
+        found = watched_branches(node)
         if k < 0 or found is None:
             return live
         mine = found.u in self.number
+        # true on one side, and at rest on it where it says so
         if node.op == "cmp":
             level = ABOVE if (found.above is YES) == mine else BELOW
             as_said = both(compare("==", self.branch[k], const(LIVE)), live)
             levels = (level, RESTS) if self.surfaces[k].jumps and node.data in (">=", "<=") else (level,)
             return either(as_said, *(compare("==", self.branch[k], const(b)) for b in levels))
+        # abs, sign, max, ...: both branches, frozen in turn
         above, below = (self._again(n) for n in ((found.above, found.below) if mine else (found.below, found.above)))
         at_rest = const(0.0) if node.data == "sign" else self._again(found.above)
         return self._branches(k, (above, at_rest, below), live, held)
 
     def _branches(self, k: int, sides: tuple[Node, Node, Node], live: Node, held: bool) -> Node:
+        """The branch that a surface stands on: above, below, at rest, live, or between where it slides."""
         (above, at_rest, below), branch, sense = sides, self.branch[k], self.sense[k]
         lower = below
+        # it may slide: a convex combination of both sides
         if sense is not None:
             part = linear(0.5, ((0.5, sense),))
             between = add(mul(part, above), mul(sub(const(1.0), part), below))
@@ -208,7 +216,11 @@ class _Freezer:
     def _conditional(self, node: Node, live: Node, held: bool) -> Node:
         """A conditional: between its branches while a relation in its condition slides."""
         test, then, other = node.args
-        slides = [k for k in dict.fromkeys(map(self._of, topological([test]))) if k >= 0 and self.sense[k] is not None]
+        slides = [
+            k
+            for k in dict.fromkeys(map(self._surface_number, topological([test])))
+            if k >= 0 and self.sense[k] is not None
+        ]
         if not slides:
             return live
         weight = self._weight(test, held)
@@ -221,18 +233,21 @@ class _Freezer:
     def _weight(self, test: Node, held: bool) -> Node:
         """How much of a condition is true: 1 or 0, (1 + s)/2 of a relation that slides."""
         one = const(1.0)
+        # s in -1..1 makes a weight in 0..1: `and` is a product, `or` its complement's, `not` the complement
         if test.op == "and":
             return mul(*(self._weight(a, held) for a in test.args))
         if test.op == "or":
             return sub(one, mul(*(sub(one, self._weight(a, held)) for a in test.args)))
         if test.op == "not":
             return sub(one, self._weight(test.args[0], held))
-        k = self._of(test)
+        k = self._surface_number(test)
         sense = self.sense[k] if k >= 0 else None
         plain = conditional(self.done[test], one, const(0.0))
-        found = watched(test)
+        found = watched_branches(test)
+        # a relation that cannot slide: 1 or 0
         if sense is None or found is None:
             return plain
+        # a relation that can: (1 + s)/2, the other way round where it is true below
         up = (found.above is YES) == (found.u in self.number)
         part = linear(0.5, ((0.5 if up else -0.5, sense),))
         return part if held else conditional(compare("==", self.branch[k], const(SLIDES)), part, plain)
@@ -252,6 +267,7 @@ class _Freezer:
             add_to("observe", len(rows) - 1, expression)
             add_to("observe_scale", len(rows) - 1, magnitude(expression))
 
+        # each surface is watched, by its rate too where it has one
         for k, (surface, kink) in enumerate(zip(self.surfaces, self.kinks, strict=True)):
             self.done = {}
             u = self.freeze(surface.u)
@@ -260,12 +276,14 @@ class _Freezer:
             if kink.rate is not None and rate is not None:
                 observe(kink.rate, self.freeze(rate))
             sense = self.sense[k]
+            # it cannot slide
             if sense is None or rate is None:
                 continue
             owner = f"#sense {k}"
             senses.append(Unknowns(f"sense of {kink.text}", "e", owner, "1", kink.place))
             shapes.append((owner, ()))
             rows.append(Equations("gamma", f"sense of {kink.text}", owner, "gamma", "1", kink.place))
+            # a gamma for the sense: the surface itself while it slides, else the side
             slides = compare("==", self.branch[k], const(SLIDES))
             # a length is no number: its own scale makes it one (Newton judges a row by its terms)
             add_to("gamma", len(rows) - 1, conditional(slides, u, sub(sense, self.branch[k])))
@@ -278,6 +296,7 @@ class _Freezer:
         last = next((k for k, f in enumerate(families) if f.kind in BESIDE), len(families))
         blocks = tuple(self._block(b, added.pop(b.name, [])) for b in self.before.blocks)
         made = (*blocks, *(Block(name, (Kernel((), tuple(new)),)) for name, new in added.items()))
+        # blocks in the order of the contract, senses before what is observed
         order = {name: number for number, name in enumerate(BLOCKS)}
         ordered = sorted(made, key=lambda b: order.get(b.name, len(order)))
         with_senses = (*families[:last], *senses, *families[last:])

@@ -79,24 +79,27 @@ class Sided:
 YES, NO = compare("==", const(0.0), const(0.0)), compare("!=", const(0.0), const(0.0))
 
 
-def sided(node: Node) -> Sided | None:
+def branches_of(node: Node) -> Sided | None:
     """The two branches of an operation; None of one without."""
+    # what changes at zero of its argument
     if node.op == "call" and node.data in ("abs", "sign", "step"):
         (x,) = node.args
         pairs = {"abs": (x, neg(x)), "sign": (const(1.0), const(-1.0)), "step": (const(1.0), const(0.0))}
         return Sided(x, *pairs[node.data])
+    # what changes where two arguments meet
     if node.op == "call" and node.data in ("max", "min"):
         a, b = node.args
         return Sided(sub(a, b), a, b) if node.data == "max" else Sided(sub(a, b), b, a)
+    # a relation: true on one side of left - right = 0
     if node.op == "cmp" and node.data in (">", ">=", "<", "<="):
         a, b = node.args
         return Sided(sub(a, b), YES, NO) if node.data[0] == ">" else Sided(sub(a, b), NO, YES)
     return None
 
 
-def watched(node: Node) -> Sided | None:
+def watched_branches(node: Node) -> Sided | None:
     """The branches of an operation on unknowns outside all loops."""
-    found = sided(node)
+    found = branches_of(node)
     if found is None or not any(v.op == "var" for v in variables(found.u)):
         return None
     if any(v.op == "var" and (v.data[1] == "audit" or v.data[2]) for v in variables(found.u)):
@@ -114,9 +117,10 @@ def surfaces(
     """
     first: dict[Node, int] = {}
     holding: dict[Node, dict[Node, None]] = {}
+    # which expressions hold each switching function; u and -u are one
     for root, row in roots(form):
         for node in topological([root]):
-            found = watched(node)
+            found = watched_branches(node)
             if found is None or found.u in floors or neg(found.u) in floors:
                 continue
             own = reads(found.u, directions)
@@ -128,6 +132,7 @@ def surfaces(
         return ()
     kept: list[Surface] = []
     known: dict[tuple[Node, ...], int | None] = {}
+    # the least smooth of them decides
     for u, row in first.items():
         level = min(smoothness(root, u, known) for root in holding[u])
         if level < SMOOTH:
@@ -148,7 +153,7 @@ def side(root: Node, u: Node, above: bool) -> Node:
     """The branch of an expression on one side of u = 0."""
 
     def branch(node: Node) -> Node | None:
-        found = watched(node)
+        found = watched_branches(node)
         if found is None or not (found.u is u or found.u is neg(u)):
             return None
         return found.above if (found.u is u) == above else found.below
@@ -181,20 +186,21 @@ def smoothness(root: Node, u: Node, known: dict[tuple[Node, ...], int | None] | 
     other names (one law of many devices).
     """
     above, below = _unlike(side(root, u, above=True), side(root, u, above=False))
+    # max(x, 0) - max(x, 0): the operations cancel
     if above is below:
         return SMOOTH
     known = {} if known is None else known
-    key = _renamed((u, above, below))
+    key = _number_leaves((u, above, below))
     if key not in known:
-        known[key] = _sampled(u, above, below)
+        known[key] = _classify_by_samples(u, above, below)
     found = known[key]
     if found is None:
         return KINK if _continuous(root, u) else JUMPS  # what the operation itself does
     return found
 
 
-def _renamed(nodes: tuple[Node, ...]) -> tuple[Node, ...]:
-    """The same text with leaves numbered as they come."""
+def _number_leaves(nodes: tuple[Node, ...]) -> tuple[Node, ...]:
+    """Nodes of the same text with leaves numbered as they come."""
     done: dict[Node, Node] = {}
     for node in topological(nodes):
         name = f"#{len(done)}"
@@ -207,15 +213,17 @@ def _renamed(nodes: tuple[Node, ...]) -> tuple[Node, ...]:
     return tuple(done[node] for node in nodes)
 
 
-def _sampled(u: Node, above: Node, below: Node) -> int | None:
+def _classify_by_samples(u: Node, above: Node, below: Node) -> int | None:
     """By values on u = 0 of the two branches there; None where none are known."""
     others, found, known = _others((above, below), u), SMOOTH, False
     moved = _mover(u, others)
+    # no leaf moves u: never crossed
     if moved is None:
         return SMOOTH
     slopes = [derivative(node, moved) for node in (u, above, below)]
     if _ends((above, below), u, slopes[0], moved):
         return SMOOTH
+    # points on the surface: some near, some far out
     for k in range(SAMPLES + DRAWS * min(len(others), MANY)):
         asked = k < SAMPLES
         values = _on_surface(u, slopes[0], moved, _drawn((u,), k) if asked else _on_sides(others, u, k))
@@ -226,13 +234,15 @@ def _sampled(u: Node, above: Node, below: Node) -> int | None:
         try:
             here, there = _values(both, values), _values(both, beside)
         except (ArithmeticError, ValueError, KeyError, TypeError):
+            # no value at an ordinary point: a pole or the end of a domain
             if asked:
                 return JUMPS
             continue
         known = True
-        if _apart(here[:2], there[:2], asked=asked):
+        # values differ: a jump; slopes differ: a kink
+        if _differ(here[:2], there[:2], asked=asked):
             return JUMPS
-        if _apart(here[2:], there[2:], asked=asked):
+        if _differ(here[2:], there[2:], asked=asked):
             found = KINK
     return found if known else None
 
@@ -268,7 +278,7 @@ def _all_on_branches(root: Node, values: Mapping[Node, float]) -> Node:
     """An expression with every operation on the branch that it has at these values."""
 
     def branch(node: Node) -> Node | None:
-        found = sided(node)
+        found = branches_of(node)
         if found is None:
             return None
         return found.above if _values((found.u,), values)[0] > 0.0 else found.below
@@ -287,7 +297,7 @@ def _others(sides: tuple[Node, ...], u: Node) -> tuple[Node, ...]:
     """What the other conditions of both branches compare with zero."""
     found: dict[Node, None] = {}
     for node in topological(sides):
-        on = sided(node)
+        on = branches_of(node)
         gap = sub(*node.args) if node.op == "cmp" else on.u if on is not None else u
         known = gap is u or neg(gap) is u or neg(gap) in found
         if not known and any(n.op in LEAVES for n in topological([gap])):
@@ -306,7 +316,7 @@ def _values(nodes: tuple[Node, ...], values: Mapping[Node, float]) -> list[float
     return evaluate(nodes, lambda node: _look(node, values))
 
 
-def _apart(here: list[float], there: list[float], *, asked: bool) -> bool:
+def _differ(here: list[float], there: list[float], *, asked: bool) -> bool:
     """Whether two values differ on the surface, against those there and beside it; asked: where there are none."""
     known = [abs(x) for x in (*here, *there) if math.isfinite(x)]
     if not all(map(math.isfinite, here)):
@@ -316,7 +326,7 @@ def _apart(here: list[float], there: list[float], *, asked: bool) -> bool:
 
 def _continuous(root: Node, u: Node) -> bool:
     """Whether the operations at u = 0 are continuous there themselves."""
-    on = [n for n in topological([root]) if (s := watched(n)) is not None and (s.u is u or s.u is neg(u))]
+    on = [n for n in topological([root]) if (s := watched_branches(n)) is not None and (s.u is u or s.u is neg(u))]
     return all(n.op == "call" and n.data in ("abs", "min", "max") for n in on)
 
 
@@ -332,22 +342,22 @@ def _on_sides(gaps: tuple[Node, ...], u: Node, number: int) -> dict[Node, float]
         leaf = chance.choice([n for n in topological([gap]) if n.op in LEAVES])
         away = chance.choice(SIDES) * chance.uniform(BESIDE, 2.0 * BESIDE)
         with suppress(ArithmeticError, KeyError, TypeError, ValueError):
-            values[leaf] = _beside(gap, leaf, values, away)
+            values[leaf] = _root_by_secants(gap, leaf, values, away)
     return values
 
 
-def _beside(gap: Node, leaf: Node, values: Mapping[Node, float], away: float) -> float:
+def _root_by_secants(gap: Node, leaf: Node, values: Mapping[Node, float], away: float) -> float:
     """The value of a leaf at which a gap is zero, by secants, or beside it on the side of `away`."""
 
-    def at(x: float) -> float:
+    def gap_at(x: float) -> float:
         return evaluate((gap,), lambda node: _look(node, {**values, leaf: x}))[0]
 
     x = values[leaf]
     for _ in range(SECANTS):
-        here = at(x)
-        x -= here / (at(x + BESIDE) - here) * BESIDE
+        here = gap_at(x)
+        x -= here / (gap_at(x + BESIDE) - here) * BESIDE
     x = float(f"{x:.12g}")
-    return x + away if at(x + away) * away >= 0.0 else x - away
+    return x + away if gap_at(x + away) * away >= 0.0 else x - away
 
 
 def _on_surface(u: Node, slope: Node, moved: Node, values: dict[Node, float]) -> Mapping[Node, float] | None:

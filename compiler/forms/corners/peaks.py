@@ -22,7 +22,7 @@ from itertools import pairwise
 from itertools import product as product_of
 
 from sysdyn.compiler.forms.corners.kinks import JUDGED, Surface
-from sysdyn.compiler.forms.corners.turning import compared, rising, turning
+from sysdyn.compiler.forms.corners.turning import rising, turning, turns_in_conditions
 from sysdyn.compiler.forms.descriptor import DescriptorForm, Kernel
 from sysdyn.dsl.model.expression import (
     Node,
@@ -73,10 +73,12 @@ def peaks(
     tables, ends, first = {t.name: t for t in network.tables}, {s.u for s in known}, dict[Node, Surface]()
     values = Values({p.name: p for p in network.parameters}, network.elements)
     blocks = (block for name in JUDGED if (block := form.block(name)) is not None)
+    # rows that are integrated, and what events watch
     laws = ((kernel, False) for block in blocks for kernel in block.kernels)
     for kernel, watched in (*laws, *((kernel, True) for kernel in _watching(whole, network))):
         if not any(True for s in kernel.rows for part in _bodies(s.expression) for _ in _hidden(part, tables, watched)):
             continue
+        # each element of arrays by itself
         for at, summand in product_of(values.iterations(kernel.nest), kernel.rows):
             root = substitute(summand.expression, as_constants(at))
             for part in _terms(root, values):
@@ -96,7 +98,7 @@ def _hidden(root: Node, tables: Mapping[str, Table], watched: bool) -> Iterator[
         degree = 1.0 / _degree(q)
         wide = (1.0 + end) ** degree
         yield sub(const(wide), power(linear(1.0, ((1.0, q),)), const(degree))), 2.0 * wide
-    for u in turning(root) if watched else compared(root):
+    for u in turning(root) if watched else turns_in_conditions(root):
         yield u, AT_ONCE
 
 
@@ -136,14 +138,17 @@ def _watchable(q: Node) -> bool:
 
 def _depths(node: Node, tables: Mapping[str, Table]) -> Iterator[tuple[Node, float]]:
     """Functions q >= 0 and the values beyond which an operation is flat."""
+    # exp(-q)
     if node.op == "call" and node.data == "exp":
         q = _below(node.args[0])
         if q is not None:
             yield q, FADES
+    # 0.5^q
     elif node.op == "pow" and node.args[0].op == "const" and node.args[0].data > 0.0:
         q = _below(scale(math.log(node.args[0].data), node.args[1]))
         if q is not None:
             yield q, FADES
+    # tanh^2, 1/cosh, powers of sin and cos, 1/(1 + q)^n
     elif node.op == "mul":
         for exponent, factor in zip(node.data, node.args, strict=True):
             named = factor.data if factor.op == "call" else ""
@@ -153,6 +158,7 @@ def _depths(node: Node, tables: Mapping[str, Table]) -> Iterator[tuple[Node, flo
                 yield linear(exponent / 2.0, ((-exponent / 2.0, power(factor, const(2.0))),)), FADES
             elif factor.op == "sum" and exponent < 0.0 and factor.data[0] > 0.0 and _even(factor):
                 yield linear(-1.0, ((1.0 / factor.data[0], factor),)), FEW ** (-1.0 / exponent)
+    # a tooth of a table: up and down again
     elif node.op == "table" and len(node.args) == 1 and node.data[0] in tables:
         for low, high in _teeth(tables[node.data[0]]):
             s = linear(-(high + low) / (high - low), ((2.0 / (high - low), node.args[0]),))
@@ -166,6 +172,7 @@ def _below(a: Node) -> Node | None:
     for c, n in terms:
         if not _moves(n):
             continue
+        # -5 sin(w) = 5 - 5 (1 + sin(w)): q takes |c| times the amplitude too; -w^2 is below 0 by itself
         amplitude = _amplitude(n)
         if amplitude is None and not (c < 0.0 and _even(n)):
             return None

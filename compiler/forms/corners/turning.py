@@ -16,7 +16,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator
 
-from sysdyn.compiler.forms.corners.kinks import sided
+from sysdyn.compiler.forms.corners.kinks import branches_of
 from sysdyn.compiler.forms.steepness import magnitude
 from sysdyn.dsl.model.expression import Node, call, const, linear, product, scale, topological_unbound, variables
 
@@ -34,17 +34,17 @@ RISEN = 144.0
 def turning(root: Node) -> Iterator[Node]:
     """Functions at whose zeros it may be largest, or jumps."""
     for node in topological_unbound([root]):
-        on = sided(node)
+        on = branches_of(node)
         if on is not None:
             jumps = node.op == "cmp" or node.data in ("sign", "step")
-            yield from _beside(on.u, magnitude(on.u)) if jumps else (on.u,)
+            yield from _zeros_nearby(on.u, magnitude(on.u)) if jumps else (on.u,)
         yield from _whole(node)
         if node.op == "mul":
             yield from _factors(node)
 
 
-def compared(root: Node) -> Iterator[Node]:
-    """The same of floor, mod and frac that conditions of a law read: a window in which it holds may be narrow."""
+def turns_in_conditions(root: Node) -> Iterator[Node]:
+    """Turns of floor, mod and frac that conditions of a law read: a window in which it holds may be narrow."""
     conditions = [node for node in topological_unbound([root]) if node.op == "cmp"]
     for node in topological_unbound(conditions):
         yield from _whole(node)
@@ -52,13 +52,13 @@ def compared(root: Node) -> Iterator[Node]:
 
 def _whole(node: Node) -> Iterator[Node]:
     if node.op == "call" and node.data in ("floor", "ceil"):
-        yield from _beside(call("sin", scale(math.pi, node.args[0])), const(1.0))
+        yield from _zeros_nearby(call("sin", scale(math.pi, node.args[0])), const(1.0))
     elif node.op == "call" and node.data == "mod":
         a, b = node.args
-        yield from _beside(call("sin", product(math.pi, ((1.0, a), (-1.0, b)))), const(1.0))
+        yield from _zeros_nearby(call("sin", product(math.pi, ((1.0, a), (-1.0, b)))), const(1.0))
 
 
-def _beside(u: Node, size: Node) -> Iterator[Node]:
+def _zeros_nearby(u: Node, size: Node) -> Iterator[Node]:
     """Zeros on both sides of that of u, as near as counts."""
     for side in (-NEAR, NEAR):
         yield linear(0.0, ((1.0, u), (side, size)))

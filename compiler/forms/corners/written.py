@@ -11,7 +11,7 @@ from collections.abc import Iterator
 from dataclasses import replace
 from itertools import product
 
-from sysdyn.compiler.forms.corners.kinks import JUDGED, MOST, SMOOTH, sided, smoothness, watched
+from sysdyn.compiler.forms.corners.kinks import JUDGED, MOST, SMOOTH, branches_of, smoothness, watched_branches
 from sysdyn.compiler.forms.descriptor import Block, DescriptorForm, Kernel, Summand
 from sysdyn.dsl.model.expression import Node, neg, substitute, topological
 from sysdyn.dsl.model.network import Network
@@ -23,7 +23,7 @@ Iteration = dict[Node, Node]
 
 def written(form: DescriptorForm, network: Network) -> DescriptorForm:
     """The form with the loops written out whose rows have corners at unknowns of their own element."""
-    nested = [(b, k) for b in form.blocks for k in b.kernels if k.nest and any(map(_cornered, k.rows))]
+    nested = [(b, k) for b in form.blocks for k in b.kernels if k.nest and any(map(_has_corner, k.rows))]
     if not nested:
         return form
     known = Values({p.name: p for p in network.parameters}, network.elements)
@@ -36,13 +36,13 @@ def written(form: DescriptorForm, network: Network) -> DescriptorForm:
     return replace(form, blocks=tuple(_block(b, corners, known) for b in form.blocks)) if corners else form
 
 
-def _cornered(summand: Summand) -> bool:
+def _has_corner(summand: Summand) -> bool:
     return any(_own(n) for n in topological([summand.expression]))
 
 
 def _own(node: Node) -> bool:
     """Whether an operation changes its branch where a quantity of its element does."""
-    found = sided(node)
+    found = branches_of(node)
     return found is not None and any(n.op == "index" for n in topological([found.u]))
 
 
@@ -54,6 +54,7 @@ def _iterations(kernel: Kernel, known: Values) -> Iterator[Iteration]:
 
 def _corners(kernel: Kernel, known: Values) -> set[Node]:
     """The switching functions of all elements at which a row of the first is not smooth."""
+    # all elements have one text: the first tells which operations are corners
     first = next(_iterations(kernel, known), None)
     if first is None:
         return set()
@@ -62,13 +63,14 @@ def _corners(kernel: Kernel, known: Values) -> set[Node]:
         root = substitute(summand.expression, first)
         for node in topological([summand.expression]):
             if _own(node):
-                here = watched(substitute(node, first))
+                here = watched_branches(substitute(node, first))
                 if here is not None and smoothness(root, here.u) < SMOOTH:
                     kept.add(node)
     found: set[Node] = set()
+    # those of every element
     for at in _iterations(kernel, known) if kept else ():
         for node in kept:
-            here = watched(substitute(node, at))
+            here = watched_branches(substitute(node, at))
             if here is not None and neg(here.u) not in found:
                 found.add(here.u)
         if len(found) > MOST:
@@ -77,9 +79,10 @@ def _corners(kernel: Kernel, known: Values) -> set[Node]:
 
 
 def _block(block: Block, corners: set[Node], known: Values) -> Block:
+    """A block whose kernels with corners are written out element by element."""
     kernels: list[Kernel] = []
     for kernel in block.kernels:
-        first = next(_iterations(kernel, known), None) if kernel.nest and any(map(_cornered, kernel.rows)) else None
+        first = next(_iterations(kernel, known), None) if kernel.nest and any(map(_has_corner, kernel.rows)) else None
         if first is None or not any(_meets(s, first, corners) for s in kernel.rows):
             kernels.append(kernel)
             continue
@@ -94,7 +97,7 @@ def _block(block: Block, corners: set[Node], known: Values) -> Block:
 def _meets(summand: Summand, at: Iteration, corners: set[Node]) -> bool:
     for node in topological([summand.expression]):
         if _own(node):
-            here = watched(substitute(node, at))
+            here = watched_branches(substitute(node, at))
             if here is not None and (here.u in corners or neg(here.u) in corners):
                 return True
     return False

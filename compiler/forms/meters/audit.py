@@ -71,23 +71,27 @@ def _add_ledger(
 ) -> None:
     """The sums of a ledger, and what its elements store."""
     place = ledger.entries[0].place
+    # a row of the audit for each account
     for name in LEDGER:
         power = "W" if ledger.unit == "J" else f"({ledger.unit})/s"
         unit = ledger.unit if name == "stored" else power
         label = f"{ledger.kind}: {ledger.title}"
         assembly.family(Equations("audit", label, f"#ledger {number} {name}", "ledger", unit, place))
+    # what an element exchanges counts for the size of the turnover alone
     for entry in ledger.entries:
         if entry.account == "exchanged":
             assembly.add("audit", f"#ledger {number} gross", (), entry.nest, call("abs", entry.expression))
             continue
         account = "stored" if entry.account in STORED else entry.account
         assembly.add("audit", f"#ledger {number} {account}", (), entry.nest, entry.expression)
+    # what elements store one by one: a jump of one of them is found there
     for found in ledger.elements():
         magnitude = call("abs", found.expression)
         if found.account in POWERS:
             assembly.add("audit", f"#ledger {number} gross", (), found.nest, magnitude)
             continue
         owner = f"#ledger {number} element {len(shapes)}"
+        # loops that follow each other make no rectangular family
         apart = not any(n.op == "index" for loop in found.nest for n in topological([loop.first, loop.last]))
         shape = loop_ranges(found.nest) if apart else ()
         shapes.append((owner, shape))
@@ -120,6 +124,7 @@ def _entries(model: EnergyModel) -> Iterator[Entry]:
     """Everything that the audit sums up."""
     m = model.mirror
     moving = (m.coordinate, m.rate, m.conjugate)
+    # f dT*/df - T*, and what enters by explicit time
     for term in model.function(m.coenergy):
         yield _entry("kinetic", term, sub(_along(term.expression, m.rate), term.expression), moving)
         yield _entry("supplied", term, neg(explicit(term.expression)), moving)
@@ -127,13 +132,16 @@ def _entries(model: EnergyModel) -> Iterator[Entry]:
         for term in model.function(name):
             yield _entry(stored, term, term.expression, moving)
             yield _entry("supplied", term, explicit(term.expression), moving)
+    # stores of several branches, by what they hold
     for stored in STORED:
         for term in model.function(f"kept {stored}"):
             works = [w for w in model.works if w.account == "stored" and w.place == term.place]
             owners = tuple(n.data[0] for w in works for n in _driven(w, m.coordinate))
             yield Entry(stored, (*owners, *_filling(model, term)), term.loops, term.expression, term.place)
+    # f dD/df
     for term in model.function(m.content):
         yield _entry("dissipated", term, _along(term.expression, m.rate), (m.rate,))
+    # each work by its account: supplied, dissipated
     for work in (w for w in model.works if w.account != "stored"):
         driven = _driven(work, m.coordinate)
         power = [mul(derivative(work.on, q), _rate(q)) for q in driven]
@@ -141,6 +149,7 @@ def _entries(model: EnergyModel) -> Iterator[Entry]:
         done = mul(work.effort, add(*power))
         lost = work.account == "dissipated"
         yield Entry(work.account, owners, work.loops, neg(done) if lost else done, work.place)
+    # a constraint that moves does work by its multiplier
     for row in model.rows:
         for term in row.terms if row.kind in ("phi", "psi") else ():
             still = explicit(term.expression) if row.kind == "phi" else _at_rest(term.expression, m.rate)

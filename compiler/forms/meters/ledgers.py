@@ -101,13 +101,13 @@ def ledgers(model: EnergyModel, entries: Sequence[Entry], acting: Iterable[Effor
     for name, first in head.items():
         members.setdefault(first, []).append(name)
     parts = [
-        Ledger("energy", units[first], tuple(own), tuple(members[first]), _listed(members[first]))
+        Ledger("energy", units[first], tuple(own), tuple(members[first]), _label_of(members[first]))
         for first, own in found.items()
     ]
     return (*parts, *_of_states(model), *_of_momenta(model, acting))
 
 
-def _listed(names: Sequence[str]) -> str:
+def _label_of(names: Sequence[str]) -> str:
     more = f" and {len(names) - SHOWN} more" if len(names) > SHOWN else ""
     return f"energy of {', '.join(names[:SHOWN])}{more}"
 
@@ -149,10 +149,12 @@ def _parts(model: EnergyModel, entries: Sequence[Entry]) -> dict[str, str]:
             parts.join(names[0], name)
 
     kinds = (model.mirror.coordinate, model.mirror.rate)
+    # coordinates of one constraint exchange energy
     for row in model.rows:
         if row.kind in ("phi", "psi"):
             join([n.data[0] for t in row.terms for n in local_variables(t.expression, kinds)])
     statements: dict[tuple[int, int, str, str], list[str]] = {}
+    # and those of one statement
     for entry in entries:
         place = entry.place
         owners = statements.setdefault((place.span.start, place.span.end, place.file, place.element), [])
@@ -185,9 +187,12 @@ def _of_momenta(model: EnergyModel, acting: Iterable[Effort]) -> Iterator[Ledger
     found: dict[str, list[Effort]] = {name: [] for name in scalars}
     for effort in acting:
         found.setdefault(effort.on.data[0], []).append(effort)
+    # efforts in loops are not added up symbolically
     free = [name for name in scalars if not any(e.nest or e.on.args for e in found[name])]
+    # sums of unlike units mean nothing
     for unit in dict.fromkeys(scalars[name].units["p"] for name in free):
         alike = {n: _coefficients(e.value for e in found[n]) for n in free if scalars[n].units["p"] == unit}
+        # combinations on which all efforts cancel: conserved momenta
         for combination in _null_space(alike):
             entries = [e for name, c in combination.items() for e in _momentum(model, scalars[name], float(c))]
             if not entries:

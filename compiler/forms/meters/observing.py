@@ -30,7 +30,7 @@ class Equation:
     target: Target
 
 
-def observed(model: EnergyModel, carriers: frozenset[str]) -> frozenset[str]:
+def observed_coordinates(model: EnergyModel, carriers: frozenset[str]) -> frozenset[str]:
     """Coordinates whose displacement a trace or an expect reads."""
     found = set()
     for quantity in model.quantities:
@@ -39,7 +39,7 @@ def observed(model: EnergyModel, carriers: frozenset[str]) -> frozenset[str]:
     return frozenset(found)
 
 
-def begun(model: EnergyModel, seen: frozenset[str]) -> frozenset[str]:
+def displacement_unknowns(model: EnergyModel, seen: frozenset[str]) -> frozenset[str]:
     """Coordinates whose displacement is an unknown: those seen, and those that an initial value ties to them or to what
     is no displacement.
     """

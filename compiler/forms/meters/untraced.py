@@ -13,7 +13,7 @@ from itertools import islice, product
 
 from sysdyn.compiler.model.energies import EnergyModel, Family, Quantity
 from sysdyn.compiler.model.parameters import Parameters, extents
-from sysdyn.compiler.network.authors import Authors, owner, shown
+from sysdyn.compiler.network.authors import Authors, in_author_names, owner
 from sysdyn.dsl.model.expression import const, var
 from sysdyn.dsl.model.network import Network
 from sysdyn.dsl.text.diagnostics import Diagnostic
@@ -32,7 +32,10 @@ def with_coordinates_observed(model: EnergyModel, network: Network) -> tuple[Ene
         box = parameters.extents(family.shape)
         number = math.prod(extents(box))
         if number > MOST:
-            whole, one = shown(f"{family.name}[0..{number - 1}]", own), shown(f"{family.name}[0]", own)
+            whole, one = (
+                in_author_names(f"{family.name}[0..{number - 1}]", own),
+                in_author_names(f"{family.name}[0]", own),
+            )
             whole, one = (whole, one) if owner(family.name, own) else (family.name, f"{family.name}[...]")
             text = f"nothing is traced: of the {number} elements of {whole} the first {MOST} are"
             notes.append(Diagnostic("N608", text, family.place, f"trace {one} in the scene"))
@@ -45,5 +48,5 @@ def _elements(
 ) -> Iterator[Quantity]:
     for at in product(*(range(first, last + 1) for first, last in box)):
         name = f"{family.name}[{', '.join(map(str, at))}]" if at else family.name
-        name = shown(name, authors)
+        name = in_author_names(name, authors)
         yield Quantity(name, var(family.name, kind, *(const(k) for k in at)), True, unit, family.place)

@@ -37,13 +37,13 @@ def _classes(classes: Series) -> Iterator[Step]:
         members.setdefault(m.coordinate, []).append(m)
     for coordinate in classes.coordinates:
         own = members.get(coordinate.name, ())
-        names = [("-" if m.sign < 0 else "") + _shown(m.element.name, m.box) for m in own]
+        names = [("-" if m.sign < 0 else "") + _box_text(m.element.name, m.box) for m in own]
         yield Step("P2", f"branches {', '.join(names)}", f"coordinate {coordinate.name}: one flow")
 
 
 def _rows(nodes: Balances) -> Iterator[Step]:
     for effort in nodes.efforts:
-        node = f"node {_shown(effort.node.removeprefix('#').strip(), effort.box)}"
+        node = f"node {_box_text(effort.node.removeprefix('#').strip(), effort.box)}"
         if effort.how == MULTIPLIER:
             yield Step("P3", node, f"psi {effort.label}: the sum of its flows is zero; its effort is the multiplier")
         elif effort.how == ZERO:
@@ -52,7 +52,7 @@ def _rows(nodes: Balances) -> Iterator[Step]:
             yield Step("P2", node, "merged: two branches, one flow")
 
 
-def _shown(name: str, box: Box) -> str:
+def _box_text(name: str, box: Box) -> str:
     """`v[1..n]`, `v[0]`."""
     ranges = [f"{i.first.node}" if i.first.value == i.last.value else f"{i.first.node}..{i.last.node}" for i in box]
     return f"{name}[{', '.join(ranges)}]" if ranges else name

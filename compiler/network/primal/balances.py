@@ -11,7 +11,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 
-from sysdyn.compiler.network.primal.bounds import Bound, Box, Interval, box_holds, number, parts, union, without
+from sysdyn.compiler.network.primal.bounds import Bound, Box, Interval, box_difference, box_holds, number, parts, union
 from sysdyn.compiler.network.primal.incidence import (
     MINUS,
     Contact,
@@ -21,7 +21,7 @@ from sysdyn.compiler.network.primal.incidence import (
     ground,
     indices,
     loops_over,
-    unrolled,
+    unrolling_error,
 )
 from sysdyn.compiler.network.primal.index_classes import Cell, End, IndexClasses, Link
 from sysdyn.dsl.model.expression import Node, index, linear, reduction, scale, var
@@ -71,7 +71,7 @@ class _Components:
         self.tied = {cell.node: cell.box for cell in incidence.all_cells() if cell.scattered}
         links = [Link(e.box, self._end(e, e.ends[0]), self._end(e, e.ends[1])) for e in branches]
         self.likeness = IndexClasses(boxes, [*links, *(self._tie(*item) for item in self.tied.items())], cuts)
-        self._refused(branches, links)
+        self._check_links(branches, links)
 
     def _tie(self, name: str, box: Box) -> Link:
         """Nodes that a table of indices reaches belong together: neighbours do."""
@@ -87,15 +87,15 @@ class _Components:
         ]
         return End(self.number[contact.node], tuple(at))
 
-    def _refused(self, branches: Sequence[Element], links: Sequence[Link]) -> None:
+    def _check_links(self, branches: Sequence[Element], links: Sequence[Link]) -> None:
         """What could not be followed does no harm where both ends are connected to ground anyway."""
         bad = {link.a for link in self.likeness.refused} | {link.b for link in self.likeness.refused}
         for element, link in zip(branches, links, strict=True):
             refused = any(link.a.item == r.a.item and link.b.item == r.b.item for r in self.likeness.refused)
-            if bad and refused and not all(self._grounded(end.item) for end in (link.a, link.b)):
-                raise unrolled(f"what node {element.ends[0].node} is connected to", element.branch.place)
+            if bad and refused and not all(self._is_grounded(end.item) for end in (link.a, link.b)):
+                raise unrolling_error(f"what node {element.ends[0].node} is connected to", element.branch.place)
 
-    def _grounded(self, item: int) -> bool:
+    def _is_grounded(self, item: int) -> bool:
         grounds = {self.likeness.find((k, ()))[0] for k, name in enumerate(self.names) if name.startswith("#ground ")}
         return all(self.likeness.find(cell)[0] in grounds for cell in self.likeness.cells(item))
 
@@ -118,7 +118,7 @@ def balances(incidence: Incidence, merged: Sequence[NodeCell]) -> Balances:
         own, floating = _split(held, components, known)
         rows += own
         still += floating
-    rows = _joined(rows)
+    rows = _merge_boxes(rows)
     labels = parts([(cell.node, box) for cell, box, _ in rows])
     efforts = [
         Effort(cell.node, box, MULTIPLIER, label.name, cell, gauge)
@@ -143,19 +143,21 @@ def _split(
     like = components.likeness
     free = [(c, node) for c, node in held if id(node) not in merged]
     earth = next(((c, node) for c, node in held if node.node == ground(node.domain)), None)
+    # one node of the component is the reference: its balance is the sum of the others
     base = _reference(free, held, earth, merged)
     corner = _corner(base[0], like)
     gauge = None if earth is None or earth is base else earth[1].node
     rows: list[tuple[NodeCell, Box, str | None]] = []
     still: list[Effort] = []
+    # the reference has an effort of zero, merged nodes are read along their class, others have a row
     for cell, node in held:
         box = like.box(cell)
         if (cell, node) == base:
             still.append(Effort(node.node, corner, ZERO, "", node, gauge))
             if id(node) in merged:
-                still += [Effort(node.node, rest, WALK, "", node, gauge) for rest in without(box, corner)]
+                still += [Effort(node.node, rest, WALK, "", node, gauge) for rest in box_difference(box, corner)]
             else:
-                rows += [(node, rest, gauge) for rest in without(box, corner)]
+                rows += [(node, rest, gauge) for rest in box_difference(box, corner)]
         elif id(node) in merged:
             still.append(Effort(node.node, box, WALK, "", node, gauge))
         else:
@@ -174,11 +176,11 @@ def _reference(free: list[Held], held: list[Held], earth: Held | None, merged: s
 
 def _corner(cell: Cell, like: IndexClasses) -> Box:
     """One node of each copy of a component: indices along which the nodes are tied together at their first value."""
-    loose = {d for d, _, _ in like.extended(cell)}
+    loose = {d for d, _, _ in like.free_dimensions(cell)}
     return tuple(i if d in loose else Interval(i.first, i.first) for d, i in enumerate(like.box(cell)))
 
 
-def _joined(rows: list[tuple[NodeCell, Box, str | None]]) -> list[tuple[NodeCell, Box, str | None]]:
+def _merge_boxes(rows: list[tuple[NodeCell, Box, str | None]]) -> list[tuple[NodeCell, Box, str | None]]:
     """Boxes of one cell made as few as possible."""
     groups: dict[tuple[int, str | None], list[tuple[NodeCell, Box]]] = {}
     for cell, box, gauge in rows:
@@ -202,11 +204,13 @@ def _rows(effort: Effort, incidence: Incidence) -> Iterator[Constraint]:
     cell = effort.cell
     yield _row(effort)
     if cell.scattered and effort.box != incidence.boxes[cell.node]:
-        raise unrolled(f"which node of {cell.node} the others are counted from", cell.place)
+        raise unrolling_error(f"which node of {cell.node} the others are counted from", cell.place)
     for element, end in cell.scattered:
         here = {name: index(name) for name in element.loops}
-        at = tuple(a.at(here) for a in element.ends[end].at)
-        flow = scale(1.0 if end == MINUS else -1.0, var(element.name, "bf", *(a.at(here) for a in element.at)))
+        at = tuple(a.substitute_loops(here) for a in element.ends[end].at)
+        flow = scale(
+            1.0 if end == MINUS else -1.0, var(element.name, "bf", *(a.substitute_loops(here) for a in element.at))
+        )
         unit, loops = cell.domain.flow, element.branch.loops
         yield Constraint("psi", effort.label, at, flow, loops, unit, cell.place, adds=True)
 
@@ -219,7 +223,7 @@ def _row(effort: Effort) -> Constraint:
         loops = touch.loops_at(at)
         ranges = touch.element.ranges
         flow_at = loops | {name: index(f"#s {name}") for name in touch.free}
-        flow = var(touch.element.name, "bf", *(a.at(flow_at) for a in touch.element.at))
+        flow = var(touch.element.name, "bf", *(a.substitute_loops(flow_at) for a in touch.element.at))
         for name in reversed(touch.free):
             flow = reduction("sum", f"#s {name}", ranges[name].first.node, ranges[name].last.node, flow)
         terms.append((1.0 if touch.end == MINUS else -1.0, flow))

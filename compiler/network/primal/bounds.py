@@ -97,7 +97,7 @@ def shape_of(box: Box) -> Shape:
     return tuple((i.first.node, i.last.node) for i in box)
 
 
-def joined(a: Box, b: Box) -> Box | None:
+def box_union(a: Box, b: Box) -> Box | None:
     """The union of two disjoint boxes where it is a box."""
     differing = [k for k, (x, y) in enumerate(zip(a, b, strict=True)) if _ends(x) != _ends(y)]
     if len(differing) != 1:
@@ -113,15 +113,16 @@ def _ends(interval: Interval) -> tuple[int, int]:
     return interval.first.value, interval.last.value
 
 
-def without(box: Box, *holes: Box) -> list[Box]:
+def box_difference(box: Box, *holes: Box) -> list[Box]:
     """The parts of a box outside others."""
     left = [box]
     for hole in holes:
-        left = [part for rest in left for part in _around(rest, hole)]
+        left = [part for rest in left for part in _parts_outside(rest, hole)]
     return left
 
 
-def _around(box: Box, hole: Box) -> Iterator[Box]:
+def _parts_outside(box: Box, hole: Box) -> Iterator[Box]:
+    """The parts of a box outside of a hole, a slab before and behind it along each dimension."""
     inner = tuple(a.common(b) for a, b in zip(box, hole, strict=True))
     if not box_size(inner):
         yield box
@@ -147,7 +148,7 @@ class Affine:
     loop: str | None
     offset: Bound
 
-    def at(self, values: dict[str, Node]) -> Node:
+    def substitute_loops(self, values: dict[str, Node]) -> Node:
         """The index with loop variables replaced."""
         return self.offset.node if self.loop is None else add(values[self.loop], self.offset.node)
 
@@ -176,9 +177,9 @@ class Picked:
         """The first that is picked."""
         return number(self.values[0])
 
-    def at(self, values: dict[str, Node]) -> Node:
+    def substitute_loops(self, values: dict[str, Node]) -> Node:
         """The index with loop variables replaced."""
-        own = self.along.at(values)
+        own = self.along.substitute_loops(values)
         return const(self.values[int(own.data)]) if own.op == "const" else param(self.table, own)
 
     def over(self, ranges: dict[str, Interval]) -> Interval:
@@ -243,13 +244,18 @@ class Sizes:
         return tuple(self.index(node, within, place).over(within) for node in at)
 
     def _leaf(self, node: Node) -> float:
+        """Number of a parameter before the start: elements of the scene, formulas over indices, values of a list
+        (E807).
+        """
         if node.op != "param" or node.data not in self._parameters:
             raise ModelError([Diagnostic("E807", f"{to_text(node)} is not known before the start", None)])
         parameter = self._parameters[node.data]
         at = tuple(const(round(self.value(a))) for a in node.args)
+        # elements that a scene sets
         for setting in self._settings:
             if setting.name == node.data and self._same(setting.at, at):
                 return self.value(setting.value)
+        # a formula with loop variables
         if parameter.indices:
             change = {index(name): value for name, value in zip(parameter.indices, at, strict=False)}
             rest = len(parameter.indices)
@@ -312,9 +318,10 @@ def union(boxes: Sequence[Box]) -> list[Box]:
     changed = True
     while changed:
         changed = False
+        # again from the beginning after each join: boxes are few
         for i in range(len(kept)):
             for j in range(i + 1, len(kept)):
-                both = joined(kept[i], kept[j])
+                both = box_union(kept[i], kept[j])
                 if both is not None:
                     kept = [*kept[:i], both, *kept[i + 1 : j], *kept[j + 1 :]]
                     changed = True

@@ -60,18 +60,22 @@ class Causality:
     def law(self) -> Law:
         """The branch's law."""
         branch = self.branch
+        # of statements, or of a coupling
         if branch.kind in ("field", "port"):
             return Law(branch.kind)
         if branch.law is None or branch.side is None:
             raise ModelError([Diagnostic("E409", f"branch {branch.name} has no law", branch.place)])
+        # a source of effort does work on its flow
         if branch.kind == "effort":
             return Law("work", branch.law)
+        # a source of flow is a constraint, of other unknowns a gamma
         if branch.kind == "flow":
             outer = [n for n in variables(branch.law) if n.op == "var" and n.data[1] != "s"]
             return Law("implicit" if outer else "row", sub(own(branch, "bf"), branch.law))
+        # given by the variable that Lagrange's form wants: as it is, unless it is solved for an implicit one
         if branch.side == OWN[branch.kind][1]:
             return self._inside_out(branch.law) or self._explicit(branch.law)
-        return self._turned(branch.law)
+        return self._invert_law(branch.law)
 
     def _inside_out(self, law: Node) -> Law | None:
         """A dissipator's e(f) with a logarithm, as f(e) with an implicit effort: where the domain ends, f is nearly
@@ -79,7 +83,7 @@ class Causality:
         """
         branch, v, w = self.branch, own(self.branch, OWN[self.branch.kind][0]), conjugate(self.branch)
         ends = (n for n in topological([law]) if n.op == "call" and n.data in ("ln", "log10", "atanh"))
-        if branch.kind != "dissipator" or not self._alone(law, v) or not any(v in variables(n) for n in ends):
+        if branch.kind != "dissipator" or not self._reads_only(law, v) or not any(v in variables(n) for n in ends):
             return None
         found = inverse(branch, law, v, w, self.slopes, self.tables)
         if found is None or not self._rest_on(found.rests):
@@ -93,14 +97,14 @@ class Causality:
         v, pseudo = own(branch, OWN[branch.kind][0]), branch.domain.pseudo
         stated = sub(conjugate(branch), law)
         if kinetic and (pseudo or self.effort_read or variables(law) - {v}):
-            return Law("state", stated, notes, tables, self._stored(law, v))
+            return Law("state", stated, notes, tables, self._stored_energy(law, v))
         alone = not pseudo and not variables(law) - {v}
         energy = self._energy(law, v) if alone else None
         if energy is not None:
             return Law("energy", energy, notes, tables)
         if kinetic:
             text = f"the {self._kept} of {branch.name} is kept as a state: its law has no closed integral"
-            kept = self._stored(law, v) if law is branch.law else None
+            kept = self._stored_energy(law, v) if law is branch.law else None
             return Law("state", stated, (*notes, ("N604", text)), tables, kept)
         kept = self._energy(law, v, valued=True) if alone and branch.kind == "potential" else None
         if branch.kind == "potential" and kept is None and not pseudo and not branch.stated:
@@ -162,32 +166,32 @@ class Causality:
             self.slopes.rest_on(self.branch, node, sign)
         return True
 
-    def _turned(self, law: Node) -> Law:
+    def _invert_law(self, law: Node) -> Law:
         """A law of the conjugate variable: inverted, or implicit."""
         branch, kinetic = self.branch, self.kinetic
         v, given = own(branch, OWN[branch.kind][0]), conjugate(branch)
-        alone = self._alone(law, given)
+        alone = self._reads_only(law, given)
         straight = line(law, given) if alone else None
         flat = self.slopes.flat(branch, straight.slope) if straight else alone and not kinetic and not variables(law)
         if flat:
-            return self._held(law if straight is None else straight.constant)
+            return self._constant_law(law if straight is None else straight.constant)
         if straight is not None and flat is not None:
             note = ("N601", f"the law of {branch.name} was inverted: it is linear")
             return self._explicit(straight.inverse(v), (note,))
         found = inverse(branch, law, given, v, self.slopes, self.tables) if alone else None
         if found is not None:
-            tried = self._explicit(found.expression, (self._said(found, v),), found.tables)
+            tried = self._explicit(found.expression, (self._note_of_inverse(found, v),), found.tables)
             if tried.how != "state" and self._rest_on(found.rests):  # an unknown less, or the law as it is
                 return tried
         text = f"{self._side(branch.side)}({self._side(given.data[1][1])}) of {branch.name} stays implicit"
-        kept = self._stored(law, given)
+        kept = self._stored_energy(law, given)
         return Law("state" if kinetic else "implicit", sub(v, law), (("N604", text),), kept=kept)
 
-    def _alone(self, law: Node, given: Node) -> bool:
+    def _reads_only(self, law: Node, given: Node) -> bool:
         """Whether a law reads `given` alone and nothing that events assign: values at the start decide no form then."""
-        return not variables(law) - {given} and not self.slopes.assigned(law)
+        return not variables(law) - {given} and not self.slopes.reads_assigned(law)
 
-    def _stored(self, law: Node, given: Node) -> Node | None:
+    def _stored_energy(self, law: Node, given: Node) -> Node | None:
         """The energy of a store with a law of `given` alone, int f dp or int e dq; None where that is not closed."""
         branch, rests = self.branch, Rests()
         if branch.kind == "dissipator" or branch.domain.pseudo or variables(law) - {given}:
@@ -198,7 +202,7 @@ class Causality:
             return None
         return area if given is own(branch, "bp") else sub(mul(given, law), area)
 
-    def _said(self, found: Inverse, v: Node) -> tuple[str, str]:
+    def _note_of_inverse(self, found: Inverse, v: Node) -> tuple[str, str]:
         """The note of an inverse."""
         name = self.branch.name.partition("#")[0]
         if not found.symbolic:
@@ -213,7 +217,7 @@ class Causality:
     def _kept(self) -> str:
         return {"p": "momentum", "q": "displacement"}[self._side("p")]
 
-    def _held(self, value: Node) -> Law:
+    def _constant_law(self, value: Node) -> Law:
         """A law without slope: v = value, a constant content has no flow."""
         branch = self.branch
         text = f"{self._side(branch.side)} of {branch.name} is held: its law has no slope"

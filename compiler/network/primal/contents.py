@@ -18,7 +18,7 @@ from collections.abc import Container, Iterable, Iterator, Sequence
 from dataclasses import replace
 
 from sysdyn.compiler.network.primal import overlaps
-from sysdyn.compiler.network.primal.bounds import Box, Interval, Sizes, box_size, shape_of, union, without
+from sysdyn.compiler.network.primal.bounds import Box, Interval, Sizes, box_difference, box_size, shape_of, union
 from sysdyn.compiler.network.primal.choices import own
 from sysdyn.compiler.network.primal.cycles import in_loops
 from sysdyn.compiler.network.primal.incidence import (
@@ -34,7 +34,7 @@ from sysdyn.compiler.network.primal.incidence import (
 )
 from sysdyn.compiler.network.primal.integrals import line
 from sysdyn.compiler.network.primal.laws import Laws
-from sysdyn.compiler.network.primal.overlaps import initially, inside, meeting, narrowed, ranges_of, untold
+from sysdyn.compiler.network.primal.overlaps import initially, inside, meeting, ranges_of, restrict_loops, untold
 from sysdyn.compiler.network.primal.reading import Ranges, Rewriter, touches_network
 from sysdyn.compiler.network.primal.series import Member
 from sysdyn.dsl.model.expression import (
@@ -71,14 +71,16 @@ def held_at(branch: Branch, kind: str, value: Node) -> Node | None:
     return None if straight is None else straight.inverse(value)
 
 
-def told(b: Branch, initials: Iterable[Initial], sizes: Sizes) -> Iterator[tuple[Initial, tuple[Loop, ...], Node]]:
+def contents_by_text(
+    b: Branch, initials: Iterable[Initial], sizes: Sizes
+) -> Iterator[tuple[Initial, tuple[Loop, ...], Node]]:
     """Of statements about a branch those that tell what elements of it hold, the loops over these, what they hold."""
     within = ranges_of(b.loops, sizes, b.place)
     for initial in initials:
         found = meeting(initial, b.at, within, sizes)
         content = None if found is None else held_at(b, initial.target.data[1], found[1])
         if found is not None and content is not None:
-            yield initial, narrowed(b.loops, found[0]), content
+            yield initial, restrict_loops(b.loops, found[0]), content
 
 
 def at_stores(
@@ -105,6 +107,7 @@ def at_stores(
 def _as_content(initial: Initial, said: Laws, reader: Rewriter) -> Iterator[Initial]:
     """Where a law tells it, what the store holds at the effort."""
     target = initial.target
+    # what is said of anything but an effort, by a number
     if target.op != "var" or target.data[1:] != ("be", 0) or variables(initial.value):
         yield initial
         return
@@ -114,12 +117,14 @@ def _as_content(initial: Initial, said: Laws, reader: Rewriter) -> Iterator[Init
         piece = reader.piece(target.data[0], target.args, ranges)
         branch = piece.element.branch
         found = None if branch in said.constant else held_at(branch, "be", mark)
+        # the law does not tell the content
         if found is None:
             return None, True
         value = substitute(reader.at_piece(found, piece, target.args), {mark: initial.value})
         return value, initial.fixed and branch in said.implicit
 
     for loops, (value, effort) in reader.cut(initial.loops, initial.place, content):
+        # the content, and the effort beside it where the law is implicit
         if value is not None:
             yield replace(initial, target=var(target.data[0], "bq", *target.args), value=value, loops=loops)
         if effort:
@@ -127,9 +132,11 @@ def _as_content(initial: Initial, said: Laws, reader: Rewriter) -> Iterator[Init
 
 
 def _at_store(initial: Initial, cells: Sequence[NodeCell], reader: Rewriter) -> Iterator[Initial]:
+    """Initial efforts of nodes as those of stores between the node and ground, element by element."""
     node = initial.target
 
     boxes: dict[Touch | None, list[Box]] = {}
+    # elements of the family by the store that each has
     for cell in cells:
         touch = next((t for t in cell.touches if _between_ground(t)), None)
         boxes.setdefault(touch, []).append(cell.box)
@@ -139,28 +146,29 @@ def _at_store(initial: Initial, cells: Sequence[NodeCell], reader: Rewriter) -> 
         return places[reader.locate(node.data[0], node.args, [box for box, _ in places], ranges)][1]
 
     for loops, touch in reader.cut(initial.loops, initial.place, store):
+        # no store to ground: the effort itself is said
         if touch is None:
             yield replace(initial, loops=loops)
             continue
         at = touch.loops_at(node.args)
-        target = var(touch.element.name, "be", *(a.at(at) for a in touch.element.at))
+        target = var(touch.element.name, "be", *(a.substitute_loops(at) for a in touch.element.at))
         value = initial.value if touch.end == PLUS else neg(initial.value)
         yield replace(initial, target=target, value=value, loops=loops)
 
 
-def _grounded(touch: Touch) -> bool:
+def _ends_at_ground(touch: Touch) -> bool:
     """Whether an element's other end is the ground."""
     return touch.element.ends[1 - touch.end].node.startswith("#ground ")
 
 
 def _between_ground(touch: Touch) -> bool:
     told = held_at(touch.element.branch, "be", const(1.0)) is not None
-    return not touch.free and _grounded(touch) and told
+    return not touch.free and _ends_at_ground(touch) and told
 
 
 def _holds(touch: Touch) -> bool:
     """Whether a kinetic store stands there between a node and the ground."""
-    return touch.element.branch.kind == "kinetic" and (len(touch.element.ends) < 2 or _grounded(touch))
+    return touch.element.branch.kind == "kinetic" and (len(touch.element.ends) < 2 or _ends_at_ground(touch))
 
 
 class Contents:
@@ -181,6 +189,7 @@ class Contents:
         self.initials = initials
         joining = [(e, e.branch.kind, e.branch.domain.common) for e in elements if len(e.ends) == 2]
         # a branch of its own law may be a wire: an ideal diode, a switch
+        # stores and sources that may close a loop: their contents are not free
         series = [e for e, kind, common in joining if common == "effort" and kind in ("potential", "effort", "field")]
         between = [e for e, kind, common in joining if reflected and common == "flow" and kind == "potential"]
         both = [*series, *between]
@@ -196,6 +205,7 @@ class Contents:
         self._loose = any(  # what is said of others may ask for contents
             not _is_content(i) and not _of_momenta(i, kinetic) for i in initials
         )
+        # what is said of contents, by branch, with the elements it is said of
         for initial in filter(_is_content, initials):
             within = ranges_of(initial.loops, reader.sizes, initial.place)
             box = reader.sizes.reach(initial.target.args, within, initial.place)
@@ -203,6 +213,7 @@ class Contents:
         followers: dict[int, list[Member]] = {}
         begin = [m for m in members if m.element.branch.kind == "potential" or m.element.name in {*read, *self._given}]
         alike: dict[str, set[int]] = {}
+        # members of one coordinate: the first leads, others follow from it
         for m in begin:
             alike.setdefault(m.coordinate, set()).add(m.element.number)
         for m in begin:
@@ -210,10 +221,11 @@ class Contents:
                 followers.setdefault(m.element.number, []).append(m)
         for group in followers.values():
             self._follower(group[0].element, group)
+        # of the reflection, stores of a loop begin at what is said of them
         for e in between:
             if e.number in self.looped and e.branch.law is not None:
                 value = self.start(e.name, indices(e.named), ranges_over(e.named))
-                self._constant(e, value if self._fixed(e, e.named) else None)
+                self._constant(e, value if self._is_fixed(e, e.named) else None)
 
     def start(self, name: str, at: tuple[Node, ...], within: overlaps.Ranges) -> Node:
         """The initial content of a store: what the statement about it says, else 0."""
@@ -231,7 +243,7 @@ class Contents:
         if element.branch.kind != "potential":
             self._led[element.number] = element
         sought = self._loose or self.looped & {element.number, *(m.leader.number for m in members)}
-        fixed = all(self._fixed(element, m.box) and self._fixed(m.leader, _led_by(m)) for m in members)
+        fixed = all(self._is_fixed(element, m.box) and self._is_fixed(m.leader, _led_by(m)) for m in members)
         self._constant(element, value if fixed or not sought else None)
 
     def _constant(self, element: Element, value: Node | None) -> None:
@@ -250,22 +262,25 @@ class Contents:
             self.states.append(State(name, shape, unit, place))
             self.dynamics.append(Dynamic(var(name, "s", *indices(box)), const(0.0), loops_over(box), place))
 
-    def _fixed(self, element: Element, box: Box) -> bool:
+    def _is_fixed(self, element: Element, box: Box) -> bool:
         """Whether the text fixes the contents of all these elements; of what is no store it does, if only at zero."""
         given = self._given.get(element.name, ())
-        return element.branch.kind != "potential" or not without(box, *(said for i, said in given if i.fixed))
+        return element.branch.kind != "potential" or not box_difference(box, *(said for i, said in given if i.fixed))
 
     # -- initial conditions -------------------------------------------------------------------------------------
 
-    def resolved(self, measured: Container[str]) -> Iterator[Initial]:
+    def initial_conditions(self, measured: Container[str]) -> Iterator[Initial]:
         """The initial conditions of coordinates and other unknowns; measured: stores whose guesses stand elsewhere."""
         known: set[tuple[Node, Node, tuple[Loop, ...], bool]] = set()
-        for initial in (*self.initials, *self._begun()):
+        for initial in (*self.initials, *self._follower_initials()):
+            # a guess of a store that is measured elsewhere
             if not initial.fixed and initial.target.op == "var" and initial.target.data[0] in measured:
                 continue
+            # of states and coordinates: as it stands
             if not touches_network(initial.target) and not touches_network(initial.value):
                 yield initial
                 continue
+            # of nodes and branches: piece by piece
             for loops, found in self.reader.cut(
                 initial.loops,
                 initial.place,
@@ -281,14 +296,14 @@ class Contents:
                     known.add(said)
                     yield replace(initial, target=target, value=value, loops=own)
 
-    def _begun(self) -> Iterator[Initial]:
+    def _follower_initials(self) -> Iterator[Initial]:
         """What followers that are no stores begin at."""
         for e in self._led.values():
             b, given = e.branch, [initial for initial, _ in self._given.get(e.name, ())]
             within = ranges_of(b.loops, self.reader.sizes, b.place)
             zero = Initial(var(e.name, "bq", *b.at), const(0.0), True, b.loops, b.place, said=False)
             for ranges in untold(given, b.at, within, self.reader.sizes):
-                yield replace(zero, loops=narrowed(b.loops, ranges))
+                yield replace(zero, loops=restrict_loops(b.loops, ranges))
 
     def _one(self, initial: Initial, ranges: Ranges) -> tuple[Node, Node] | None:
         """Where one piece is read: target and value; of stores whose constant is told the coordinate of their class;

@@ -22,7 +22,7 @@ from sysdyn.compiler.network.primal.potentials import Potentials
 from sysdyn.compiler.network.primal.precedence import foremost
 from sysdyn.compiler.network.primal.reading import EliminationTable, IndexBox, Rewriter
 from sysdyn.compiler.network.primal.series import Series, series
-from sysdyn.compiler.network.primal.unspecified import measured
+from sysdyn.compiler.network.primal.unspecified import guess_contents
 from sysdyn.dsl.model.expression import Node, variables
 from sysdyn.dsl.model.network import Constraint, Coordinate, Dynamic, Energy, Expectation, Network, Work
 from sysdyn.dsl.model.rewriting import EXPRESSIONS, expressions
@@ -30,33 +30,38 @@ from sysdyn.dsl.text.diagnostics import Diagnostic, ModelError, Place
 
 
 def primal(network: Network, *, reflected: bool = False) -> tuple[Network, tuple[Diagnostic, ...], tuple[Step, ...]]:
-    """The same model in coordinates, notes about inverted laws, and what became of nodes and branches; ModelError where
-    that cannot be.  reflected: the network is the reflection of the author's.
+    """The network in coordinates, notes about inverted laws, and what became of nodes and branches; ModelError where
+    that cannot be. reflected: the network is the reflection of the author's.
     """
     if not network.branches and not network.nodes:
         return network, (), ()
     sizes = Sizes(network)
+    # which elements end where, and which flows are equal
     incidence = Incidence(network, sizes)
     classes = series(incidence, network.read)
+    # balances of effort nodes
     nodes = balances(incidence, classes.merged)
+    # each branch's law, solved for what the form wants
     said = laws(network, incidence.elements, sizes, reflected=reflected)
     potentials = Potentials(nodes.efforts)
     pieces = _pieces(incidence.elements, classes)
     book = EliminationTable(pieces, said.efforts, said.momenta, potentials.read, functions=said.functions)
     book.sticking = _sticking(network)
     reader = Rewriter(sizes, book)
+    # initial values at stores, the later statement before the earlier
     told = at_stores(network, said, incidence, reader, reflected=reflected)
     initials = foremost(tuple(told), network.branches, sizes)
     read = _charges(network)
     contents = Contents(reader, classes.members, initials, incidence.elements, reflected=reflected, read=read)
-    guesses, stores = measured(network, said.constant, initials, sizes, reader, reflected=reflected)
+    guesses, stores = guess_contents(network, said.constant, initials, sizes, reader, reflected=reflected)
+    # the network in coordinates alone
     found = replace(
         network,
         parameters=(*network.parameters, *contents.parameters),
         coordinates=(*network.coordinates, *_node_coordinates(network), *classes.coordinates),
         unknowns=(*network.unknowns, *said.unknowns.values()),
         states=(*network.states, *said.states.values(), *contents.states),
-        initials=(*contents.resolved(stores), *said.initials, *guesses),
+        initials=(*contents.initial_conditions(stores), *said.initials, *guesses),
         nodes=(),
         branches=(),
         couplings=(),

@@ -51,8 +51,8 @@ def field_quantities(network: Network, elements: Sequence[Element]) -> tuple[dic
     slopes = {name: _slopes(network, name) for name in {e.name for e in fields}} if fields else {}
     for e in fields:
         given, momentum = slopes[e.name]
-        held = [_at(s, e.branch.at, e.branch.loops) for s in momentum]
-        found = [_at(s, e.branch.at, e.branch.loops) for s in given]
+        held = [_slope_of_element(s, e.branch.at, e.branch.loops) for s in momentum]
+        found = [_slope_of_element(s, e.branch.at, e.branch.loops) for s in given]
         if held:
             momenta[e.number] = add(*held)
             found.append(time_derivative(momenta[e.number]))
@@ -65,25 +65,30 @@ def _slopes(network: Network, name: str) -> tuple[list[_Slope], list[_Slope]]:
     """What makes the effort, and what makes the momentum, of the branches of a family."""
     efforts: list[_Slope] = []
     momenta: list[_Slope] = []
+    # e = dV/dq - dT*/dq + dD/df, p = dT*/df
     for energy in network.energies:
         sign = {"V": 1.0, "T": 1.0, "T*": -1.0}.get(energy.function)
         if sign is not None:
-            efforts += _by(energy.expression, energy.loops, energy.place, (name, "bq"), const(sign))
+            efforts += _slopes_by(energy.expression, energy.loops, energy.place, (name, "bq"), const(sign))
         if energy.function == "D":
-            efforts += _by(energy.expression, energy.loops, energy.place, (name, "bf"), const(1.0))
+            efforts += _slopes_by(energy.expression, energy.loops, energy.place, (name, "bf"), const(1.0))
         if energy.function == "T*":
-            momenta += _by(energy.expression, energy.loops, energy.place, (name, "bf"), const(1.0))
+            momenta += _slopes_by(energy.expression, energy.loops, energy.place, (name, "bf"), const(1.0))
+    # minus what works supply
     for work in network.works:
-        efforts += _by(work.on, work.loops, work.place, (name, "bq"), neg(work.effort))
+        efforts += _slopes_by(work.on, work.loops, work.place, (name, "bq"), neg(work.effort))
+    # and reactions
     for c in network.constraints:
         if c.kind in ("phi", "psi"):
             multiplier = var(c.name, "kappa" if c.kind == "phi" else "mu", *c.at)
             kind = "bq" if c.kind == "phi" else "bf"
-            efforts += _by(c.expression, c.loops, c.place, (name, kind), multiplier)
+            efforts += _slopes_by(c.expression, c.loops, c.place, (name, kind), multiplier)
     return efforts, momenta
 
 
-def _by(root: Node, loops: tuple[Loop, ...], place: Place, wanted: tuple[str, str], factor: Node) -> Iterator[_Slope]:
+def _slopes_by(
+    root: Node, loops: tuple[Loop, ...], place: Place, wanted: tuple[str, str], factor: Node
+) -> Iterator[_Slope]:
     """Factor times the derivative of a statement by each reference to the branch that it holds."""
     if not any(n.op == "var" and n.data == (*wanted, 0) for n in variables(root)):
         return
@@ -95,7 +100,7 @@ def _by(root: Node, loops: tuple[Loop, ...], place: Place, wanted: tuple[str, st
                 yield _Slope(node.args, mul(substitute(factor, change), slope), term.loops)
 
 
-def _at(found: _Slope, wanted: tuple[Node, ...], own: tuple[Loop, ...]) -> Node:
+def _slope_of_element(found: _Slope, wanted: tuple[Node, ...], own: tuple[Loop, ...]) -> Node:
     """The slope for one element: an index that is a loop variable over the branch's own range takes its place."""
     change: dict[Node, Node] = {}
     ranges = {index(loop.index): (loop.first, loop.last) for loop in own}

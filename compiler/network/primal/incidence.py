@@ -122,18 +122,25 @@ def elements(network: Network, sizes: Sizes) -> tuple[Element, ...]:
 
 
 def _element(number: int, branch: Branch, sizes: Sizes) -> Iterator[Element]:
+    """A branch as a box of elements with ends, none of an empty range; E806 of ranges or indices that boxes cannot
+    hold.
+    """
     loops = tuple(loop.index for loop in branch.loops)
+    # triangular loops
     for loop in branch.loops:
         for bound in (loop.first, loop.last):
             if sizes.affine(bound, loops, branch.place).loop is not None:
-                raise unrolled(f"the range of {branch.name} along {loop.index} follows another index", branch.place)
+                raise unrolling_error(
+                    f"the range of {branch.name} along {loop.index} follows another index", branch.place
+                )
     box = tuple(sizes.interval(loop.first, loop.last, branch.place) for loop in branch.loops)
     if not box_size(box):
         return
     at = tuple(sizes.affine(node, loops, branch.place) for node in branch.at)
+    # each loop numbers the branch along one index
     for name in loops:
         if sum(a.loop == name for a in at) != 1:
-            raise unrolled(f"{branch.name} is not indexed once by {name}", branch.place)
+            raise unrolling_error(f"{branch.name} is not indexed once by {name}", branch.place)
     ends: tuple[Contact, ...] = ()
     if branch.on is None:
         pair = (branch.plus, branch.minus)
@@ -146,11 +153,11 @@ def _contact(terminal: Terminal, branch: Branch, loops: tuple[str, ...], sizes: 
     at = tuple(sizes.index(node, loops, branch.place) for node in terminal.at)
     used = [a.loop for a in at if a.loop is not None]
     if len(used) != len(set(used)):
-        raise unrolled(f"{branch.name} meets node {name} along a diagonal", branch.place)
+        raise unrolling_error(f"{branch.name} meets node {name} along a diagonal", branch.place)
     return Contact(name, at)
 
 
-def unrolled(what: str, place: Place | None) -> ModelError:
+def unrolling_error(what: str, place: Place | None) -> ModelError:
     """E806: a pattern that index classes cannot hold."""
     return ModelError([Diagnostic("E806", f"{what}: it would have to be unrolled", place)])
 
@@ -165,17 +172,20 @@ class Incidence:
         self.cells: dict[str, tuple[NodeCell, ...]] = {}
         self.sizes = sizes
         self._contacts: dict[str, list[tuple[Element, int, Contact]]] = {}
+        # ends by node
         for e in self.elements:
             for k, c in enumerate(e.ends):
                 self._contacts.setdefault(c.node, []).append((e, k, c))
         for family in network.nodes:
             if family.domain.common == "effort":
                 self._add(family.name, family, sizes.box(family.shape, family.place))
+        # the ground of each domain as a node
         for domain in dict.fromkeys(e.branch.domain for e in self.elements if e.branch.domain.common == "effort"):
             if ground(domain) in self._contacts:
                 self._add(ground(domain), NodeFamily(ground(domain), (), domain, domain.place), ())
 
     def _add(self, name: str, family: NodeFamily, box: Box) -> None:
+        """Enter a family of nodes: its box, cut into cells that are touched alike; E805 of an end outside."""
         self.boxes[name] = box
         reaches = [(e, k, tuple(a.over(e.ranges) for a in c.at)) for e, k, c in self._contacts.get(name, ())]
         for e, _, reach in reaches:
@@ -183,11 +193,13 @@ class Incidence:
                 at = ", ".join(f"{i.first.value}..{i.last.value}" for i in reach)
                 text = f"{e.name} meets {name}[{at}], outside its range"
                 raise ModelError([Diagnostic("E805", text, e.branch.place)])
+        # indices by a table: which elements are touched is not cut apart
         if any(isinstance(a, Picked) for _, _, c in self._contacts.get(name, ()) for a in c.at):
             ends = tuple((e, k) for e, k, _ in reaches)
             self.cells[name] = (NodeCell(name, family.domain, box, (), family.place, ends),)
             return
         sides: list[list[Interval]] = []
+        # cuts along each dimension where an element begins or ends
         for d, whole in enumerate(box):
             cuts: dict[int, Bound] = {}
             for interval in (whole, *(reach[d] for _, _, reach in reaches)):
@@ -195,6 +207,7 @@ class Incidence:
                     cuts.setdefault(cut.value, cut)
             sides.append(between(cuts))
         found = []
+        # cells that nothing touches are left out
         for part in itertools.product(*sides):
             touches = tuple(_touch(e, k) for e, k, reach in reaches if box_holds(reach, part))
             if touches:

@@ -69,7 +69,7 @@ class IndexClasses:
         kept = [link for link in map(_without_points, links) if self._align(link)]
         self._intervals = self._cut(kept, cuts)
         self._numbers = {axis: {i.first.value: k for k, i in enumerate(v)} for axis, v in self._intervals.items()}
-        self._unite([link for link in kept if self._followed(link)])
+        self._unite([link for link in kept if self._can_follow(link)])
 
     # -- axes ---------------------------------------------------------------------------------------------------
 
@@ -104,7 +104,7 @@ class IndexClasses:
         places = self._places(link, k)
         return (places[0][1], places[0][2].value - places[1][2].value) if len(places) == 2 else None
 
-    def _followed(self, link: Link) -> bool:
+    def _can_follow(self, link: Link) -> bool:
         """Whether the link is one that ties equals, or neighbours along one axis."""
         shifts = [s[1] for k in range(len(link.box)) if (s := self._shift(link, k)) is not None]
         if sum(s != 0 for s in shifts) > 1 or any(abs(s) > 1 for s in shifts):
@@ -115,6 +115,7 @@ class IndexClasses:
     # -- cells --------------------------------------------------------------------------------------------------
 
     def _cut(self, links: Sequence[Link], cuts: Iterable[Cut]) -> dict[Key, list[Interval]]:
+        """Intervals of each axis between all ends of items, links and cuts that are asked for."""
         found: dict[Key, dict[int, Bound]] = {}
 
         def add(axis: Key, first: Bound, behind: Bound) -> None:
@@ -173,13 +174,13 @@ class IndexClasses:
             found.append(self._intervals[axis][k].minus(offset))
         return tuple(found)
 
-    def extended(self, cell: Cell) -> list[tuple[int, Key, int]]:
+    def free_dimensions(self, cell: Cell) -> list[tuple[int, Key, int]]:
         """(dimension, axis, interval) where the cell has more than one element that are not tied together."""
         item, at = cell
         found = []
         for d, k in enumerate(at):
             axis = self.axis(item, d)[0]
-            if self._intervals[axis][k].size > 1 and not self.collapsed(cell, axis, k):
+            if self._intervals[axis][k].size > 1 and not self.is_collapsed(cell, axis, k):
                 found.append((d, axis, k))
         return found
 
@@ -198,7 +199,7 @@ class IndexClasses:
             self._parent[below] = cell, sign
         return cell, sign
 
-    def collapsed(self, cell: Cell, axis: Key, k: int) -> bool:
+    def is_collapsed(self, cell: Cell, axis: Key, k: int) -> bool:
         """Whether all elements along an axis' interval are tied together in the cell's group."""
         return (self.find(cell)[0], axis, k) in self._collapsed
 
@@ -223,9 +224,11 @@ class IndexClasses:
     def _unite(self, links: Sequence[Link]) -> None:
         """Equals first, one with many too, then runs inside cells, then what reaches from cell to cell."""
         applied = [(link, choice) for link in links for choice in self._choices(link)]
+        # whole cells that equal each other
         for link, choice in applied:
             if all(o.how in ("zero", "free") for o in choice):
                 self._join(*self._ends(link, choice), link.sign)
+        # runs: neighbours tied inside of one cell make it one class along the axis
         for link, choice in applied:
             a, b = self._ends(link, choice)
             for option in choice:
@@ -236,18 +239,19 @@ class IndexClasses:
                 elif option.how == "free" and option.axis is not None:
                     end = a if option.b < 0 else b
                     self._collapsed.add((self.find(end)[0], option.axis, max(option.a, option.b)))
+        # from cell to cell: only where both sides are collapsed already
         for link, choice in applied:
             a, b = self._ends(link, choice)
             crossing = [o for o in choice if o.how == "cross" and o.axis is not None]
-            if all(self._tied(a, o.axis, o.a) and self._tied(b, o.axis, o.b) for o in crossing):
+            if all(self._is_tied(a, o.axis, o.a) and self._is_tied(b, o.axis, o.b) for o in crossing):
                 if foremost_way(choice) in ("cross", "free"):
                     self._join(a, b, link.sign)
             else:
                 self._refuse(link)
 
-    def _tied(self, cell: Cell, axis: Key | None, k: int) -> bool:
+    def _is_tied(self, cell: Cell, axis: Key | None, k: int) -> bool:
         assert axis is not None
-        return self._intervals[axis][k].size == 1 or self.collapsed(cell, axis, k)
+        return self._intervals[axis][k].size == 1 or self.is_collapsed(cell, axis, k)
 
     def _refuse(self, link: Link) -> None:
         if link not in self.refused:
@@ -263,17 +267,23 @@ class IndexClasses:
         return [(n, axis, own.plus(offset)) for n, own, (axis, offset) in found]
 
     def _options(self, link: Link, k: int) -> list[Option]:
+        """The intervals that a link meets along one dimension: tied by nothing, to one point, within one cell, or
+        across.
+        """
         places = [(n, axis, link.box[k].plus(moved)) for n, axis, moved in self._places(link, k)]
         if not places:
             return [Option("zero", -1, -1, None)]
+        # one end moves along the axis, the other stays
         if len(places) == 1:
             n, axis, stretch = places[0]
             inside = self._inside(axis, stretch)
             return [Option("free", i if n == 0 else -1, i if n == 1 else -1, axis) for i in inside]
         (_, axis, at_a), (_, _, at_b) = places
         shift = at_a.first.value - at_b.first.value
+        # both move together
         if shift == 0:
             return [Option("zero", i, i, axis) for i in self._inside(axis, at_a)]
+        # shifted by one: neighbours
         low, high = (at_b, at_a) if shift > 0 else (at_a, at_b)
         inside = self._inside(axis, Interval(low.first, high.last))
         found = [Option("self", i, i, axis) for i in inside if self._intervals[axis][i].size > 1]
@@ -295,7 +305,7 @@ def _without_points(link: Link) -> Link:
     """Indices of the link that take one value only as constants."""
     points = {k: i.first for k, i in enumerate(link.box) if i.size == 1}
 
-    def fixed(end: End) -> End:
+    def at_point(end: End) -> End:
         return End(end.item, tuple((None, points[k].plus(c)) if k in points else (k, c) for k, c in end.at))
 
-    return replace(link, a=fixed(link.a), b=fixed(link.b))
+    return replace(link, a=at_point(link.a), b=at_point(link.b))

@@ -54,12 +54,16 @@ def polynomial(root: Node, v: Node) -> Monomials | None:
 
 
 def _monomials(node: Node, v: Node, found: dict[Node, Monomials | None]) -> Monomials | None:
+    """A node as a polynomial in v and abs(v): coefficient by the two powers; None where it is none or of too high
+    degree.
+    """
     if node is v:
         return {(1, 0): const(1.0)}
     if v not in unknowns(node):
         return {(0, 0): node}
     if node.op == "call" and node.data == "abs" and node.args[0] is v:
         return {(0, 1): const(1.0)}
+    # coefficients add
     if node.op == "sum":
         total: Monomials = {(0, 0): const(node.data[0])}
         for c, a in zip(node.data[1], node.args, strict=True):
@@ -68,7 +72,8 @@ def _monomials(node: Node, v: Node, found: dict[Node, Monomials | None]) -> Mono
                 return None
             for power, coefficient in part.items():
                 total[power] = linear(0.0, ((1.0, total.get(power, const(0.0))), (c, coefficient)))
-        return _kept(total)
+        return _drop_zeros(total)
+    # products of polynomials, whole powers by repetition
     if node.op == "mul":
         result: Monomials = {(0, 0): const(1.0)}
         for exponent, a in zip(node.data, node.args, strict=True):
@@ -82,7 +87,7 @@ def _monomials(node: Node, v: Node, found: dict[Node, Monomials | None]) -> Mono
                 result = _times(result, part)
                 if max(a + b for a, b in result) > HIGHEST:
                     return None
-        return _kept(result)
+        return _drop_zeros(result)
     return None
 
 
@@ -96,7 +101,7 @@ def _times(left: Monomials, right: Monomials) -> Monomials:
     return total
 
 
-def _kept(found: Monomials) -> Monomials:
+def _drop_zeros(found: Monomials) -> Monomials:
     return {power: c for power, c in found.items() if not is_const(c, 0.0)}
 
 
@@ -137,15 +142,18 @@ def antiderivative(root: Node, v: Node, rests: Rests, *, valued: bool = False) -
 
     valued: only its value is wanted, it is not going to be differentiated.
     """
+    # polynomials, abs(v) included
     found = polynomial(root, v)
     if found is not None:
         return _of_polynomial(found, v)
+    # term by term
     if root.op == "sum":
         parts = [antiderivative(a, v, rests, valued=valued) for a in root.args]
         if None in parts:
             return None
         pieces = [(c, part) for c, part in zip(root.data[1], parts, strict=True) if part is not None]
         return linear(0.0, [*pieces, (root.data[0], v)])
+    # a factor that does not depend on v
     if root.op == "mul" and any(v not in unknowns(a) for a in root.args):
         factors = list(zip(root.data, root.args, strict=True))
         inner = antiderivative(product(1.0, ((e, a) for e, a in factors if v in unknowns(a))), v, rests, valued=valued)
@@ -154,6 +162,7 @@ def antiderivative(root: Node, v: Node, rests: Rests, *, valued: bool = False) -
     if root.op == "mul":
         return _over_root(root, v, rests)
     primitives = {**_PRIMITIVES, **_VALUED} if valued else _PRIMITIVES
+    # f(a v + b): its primitive divided by a
     if root.op == "call" and root.data in primitives and (inside := line(root.args[0], v)) is not None:
         primitive = primitives[root.data]
         rests.append((inside.slope, 0))
@@ -177,6 +186,7 @@ def _over_root(root: Node, v: Node, rests: Rests) -> Node | None:
 
 
 def _of_polynomial(found: Monomials, v: Node) -> Node:
+    """Integral of a polynomial in v and abs(v) from 0."""
     size = call("abs", v)
     terms = []
     for (a, b), c in found.items():

@@ -93,6 +93,7 @@ def inverse(branch: Branch, law: Node, v: Node, w: Node, slopes: Slopes, tables:
     """The inverse of w = law(v); None where it is in doubt."""
     x, y = var("#own", "s"), var("#value", "s")  # without indices, which would be parts of the law
     law = substitute(law, {v: x})
+    # what does not depend on v becomes blanks, with their signs as the numbers have them
     filled = _blanks(law, x)
     values = {blank: slopes.values(branch, node) for blank, node in filled.items()}
     known = {blank: a for blank, a in values.items() if a is not None and a.size and np.isfinite(a).all()}
@@ -102,9 +103,11 @@ def inverse(branch: Branch, law: Node, v: Node, w: Node, slopes: Slopes, tables:
     found = _Found()
     signs = {blank: _sign(a) for blank, a in known.items()}
     held = {t.name: t for t in tables}
-    solved = _solved(plain, x, y, signs, held, found)
+    solved = _solve_for(plain, x, y, signs, held, found)
+    # proven by samples
     if solved is None or not _holds(plain, solved, x, y, known, {**held, **found.tables}):
         return None
+    # what is divided by must not be zero
     for node in (substitute(d, filled) for d in found.divisors):
         divided = slopes.values(branch, node)
         if divided is None or not np.isfinite(divided).all() or not divided.all():
@@ -134,7 +137,7 @@ def _sign(values: NDArray[np.float64]) -> int:
     return 1 if (values > 0.0).all() else -1 if (values < 0.0).all() else 0
 
 
-def _solved(
+def _solve_for(
     law: Node, v: Node, w: Node, signs: Mapping[Node, int], tables: Mapping[str, Table], found: _Found
 ) -> Node | None:
     """The inverse, shell by shell; the core by sympy."""
@@ -143,20 +146,25 @@ def _solved(
         root = _root(law, v, w, found)
         if root is not None:
             return root
+        # v stands in several arguments
         if len(at) != 1:
             return _core(law, v, w, signs, found)
         inner = law.args[at[0]]
+        # a v + b = w
         if law.op == "sum":
             rest = [(-c, a) for k, (c, a) in enumerate(zip(law.data[1], law.args, strict=True)) if k != at[0]]
             w = scale(1.0 / law.data[1][at[0]], linear(-law.data[0], ((1.0, w), *rest)))
+        # a v = w
         elif law.op == "mul" and law.data[at[0]] == 1.0:
             factor = product(1.0, ((e, a) for e, a in zip(law.data, law.args, strict=True) if a is not inner))
             found.divisors.append(factor)
             w = div(w, factor)
+        # exp(v) = w and its like
         elif law.op == "call" and law.data in _SHELLS:
             found.symbolic = True
             w = _SHELLS[law.data](w)
-        elif law.op == "table" and law.data[1] == 0 and (turned := _turned(tables[law.data[0]])) is not None:
+        # a table read backwards
+        elif law.op == "table" and law.data[1] == 0 and (turned := _exchange_columns(tables[law.data[0]])) is not None:
             found.tables[turned.name] = turned
             w = table(turned.name, w)
         else:
@@ -169,6 +177,7 @@ def _root(law: Node, v: Node, w: Node, found: _Found) -> Node | None:
     """The inverse of  r v^a |v|^b sign(v)^c  odd and of a degree a + b up to 1: its slope is nowhere zero."""
     degree, parity, rest = 0.0, 0.0, []
     factors = [(1.0, law)]
+    # degree and parity of all factors that hold v
     while factors:
         e, a = factors.pop()
         if a is v:
@@ -184,6 +193,7 @@ def _root(law: Node, v: Node, w: Node, found: _Found) -> Node | None:
             factors.append((e, a.args[0]))
         else:
             return None
+    # even, or of a slope that vanishes at zero
     if parity % 2 != 1 or not 0.0 < degree < 1.0:
         return None
     factor = product(1.0, rest)
@@ -193,7 +203,7 @@ def _root(law: Node, v: Node, w: Node, found: _Found) -> Node | None:
     return mul(w, product(1.0, ((1.0 / degree - 1.0, call("abs", w)),)))
 
 
-def _turned(given: Table) -> Table | None:
+def _exchange_columns(given: Table) -> Table | None:
     """The table with its columns exchanged; None where it is not linear and strictly monotone, or not extended."""
     if given.method != "linear" or len(given.points) != 1 or given.outside != "extend":
         return None
@@ -215,24 +225,28 @@ def _core(law: Node, v: Node, w: Node, signs: Mapping[Node, int], found: _Found)
     used = {n: s for n, s in signs.items() if n in inside}
     if 0 in used.values() or not all(_algebraic(n) or n is size for n in inside) or not _few(inside):
         return None
+    # an odd law is solved for v > 0 and continued
     odd = is_const(add(law, substitute(substitute(law, {size: y}), {v: neg(v), y: size})), 0.0)
     if size in inside and not odd:
         return None
     known: dict[Node, Reals] = {n: POSITIVE if s > 0 else NEGATIVE for n, s in used.items()}
     known[v] = NOT_NEGATIVE if odd else ALL
     branch = substitute(law, {size: v})  # an odd law is solved for v > 0
+    # defined without gaps
     if not _on_an_interval(branch, v, known):
         return None
     from sysdyn.compiler.network.primal.symbolic import Algebra
 
     slope, algebra = derivative(branch, v), Algebra(v, y, used, positive=odd)
+    # monotone: its slope has one sign, perhaps after simplification
     if reals(slope, known).sign == 0:
-        simple = algebra.simplified(slope)
+        simple = algebra.simplify(slope)
         if simple is None or reals(simple, known).sign == 0:
             return None
     found.signed.update(used)
     found.symbolic = True
     rising = math.copysign(1.0, _slope_of(branch, v, used)) if odd else 1.0
+    # roots of the equation, the first that holds by samples
     for candidate in algebra.roots(scale(rising, branch), over_value=odd):
         if odd:  # v = w h(|w|): its slope at 0 is that of the law
             inner = y if substitute(candidate, {y: neg(y)}) is candidate else call("abs", y)
@@ -288,7 +302,7 @@ def _holds(
     slope = derivative(solved, w)
     for values in _parameters(known):
 
-        def at(root: Node, name: Node, x: NDArray[np.float64], values: Mapping[Node, float] = values) -> Value:
+        def evaluate_on(root: Node, name: Node, x: NDArray[np.float64], values: Mapping[Node, float] = values) -> Value:
             def lookup(node: Node, args: list[Value]) -> Value:
                 if node.op == "table":
                     return evaluate_table(tables[node.data[0]], args, (node.data[1],))
@@ -296,9 +310,9 @@ def _holds(
 
             return np.broadcast_to(np.asarray(evaluate([root], lookup)[0], dtype=float), x.shape)
 
-        if not _forth(law, solved, v, w, at) or not _back(law, solved, v, w, at):
+        if not _forth(law, solved, v, w, evaluate_on) or not _back(law, solved, v, w, evaluate_on):
             return False
-        steep = at(slope, w, np.append(_DECADES, 0.0))
+        steep = evaluate_on(slope, w, np.append(_DECADES, 0.0))
         if np.isnan(steep).any() or np.isinf(steep[-1]):
             return False
     return True

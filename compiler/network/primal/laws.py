@@ -93,14 +93,17 @@ def laws(network: Network, elements: Sequence[Element], sizes: Sizes, *, reflect
     choices = [(e, Causality(e.branch, slopes, network.tables, e.name in wanted, letters)) for e in elements]
     chosen = [(e, choice.law()) for e, choice in choices]
     asked = read_functions(network)
+    # state functions that somebody reads
     for (e, choice), (_, law) in zip(choices, chosen, strict=True):
         if e.name in asked:
             found.functions[e.number] = choice.functions(law)
     names: dict[tuple[int, str], Part] = {}
+    # names of unknowns and rows that the laws make
     for suffix, hows in (("e", ("implicit", "state")), ("p", ("state",)), ("law", ("implicit", "state", "row"))):
         kept = [e for e, law in chosen if law.how in hows]
         for e, part in zip(kept, parts([(f"{e.name}.{suffix}", e.named) for e in kept]), strict=True):
             names[e.number, suffix] = part
+    # what each law says: works, rows, unknowns
     for element, law in chosen:
         _Statement(element, law, names, found).say()
     integrate_powers([e for e, _ in chosen if e.name in asked], found, reflected=reflected)
@@ -108,9 +111,10 @@ def laws(network: Network, elements: Sequence[Element], sizes: Sizes, *, reflect
     found.efforts.update(efforts)
     found.momenta.update(momenta)
     keep = network.scene is not None and network.scene.keeps("keep_implicit")
+    # two-ports
     for coupling, label in _ratios(network, elements, sizes):
         explicit = coupling.kind != "gyrator" or coupling.side == "e"
-        divided = explicit or slopes.divided(coupling)
+        divided = explicit or slopes.may_divide(coupling)
         _couple(coupling, label, elements, sizes, found, keep=keep, divided=divided)
     found.slopes = tuple(slopes.decided)
     return found
@@ -256,19 +260,22 @@ def _couple(
     c = coupling
     first, second = (var(name, "bf", *c.at) for name in (c.first, c.second))
     domain = next(e.branch.domain for e in elements if e.name == c.first)
+    # efforts by flows: works, or unknowns closed by gammas
     if c.kind == "gyrator":
         ratio = c.ratio if c.side == "e" else neg(div(const(1.0), c.ratio))
         efforts = mul(ratio, second), neg(mul(ratio, first))
         if keep or not divided:
-            efforts = _kept(c, part, efforts, elements, found, divided=divided)
+            efforts = _gyrator_by_efforts(c, part, efforts, elements, found, divided=divided)
         for effort, name in zip(efforts, (c.first, c.second), strict=True):
             place = replace(c.place, element=c.stem)
             found.works.append(Work(neg(effort), var(name, "bq", *c.at), c.loops, place))
     else:
         multiplier = var(label, "mu", *c.at)
+        # f1 = n f2: a flow constraint, its multiplier the effort of the first side
         if c.side == "f":
             equation = sub(first, mul(c.ratio, second))
             efforts = multiplier, neg(mul(c.ratio, multiplier))
+        # e1 = n e2: the companion f2 = -n f1
         else:
             equation = add(second, mul(c.ratio, first))
             efforts = mul(c.ratio, multiplier), multiplier
@@ -283,7 +290,7 @@ def _couple(
                 found.efforts[e.number] = _at_element(effort, places, e)
 
 
-def _kept(
+def _gyrator_by_efforts(
     coupling: Coupling,
     part: Part,
     efforts: tuple[Node, Node],
@@ -302,6 +309,7 @@ def _kept(
         found.unknowns.setdefault(unknown, Unknown(unknown, shape_of(part.box), unit, c.place))
         own_effort = var(unknown, "e", *c.at)
         equation = sub(own_effort, effort)
+        # f1 = g e2 as it is written
         if not divided:
             equation, unit = (add, sub)[port - 1](flows[port - 1], mul(c.ratio, own_effort)), other.flow
         found.constraints.append(Constraint("gamma", f"{unknown}.law", c.at, equation, c.loops, unit, c.place))

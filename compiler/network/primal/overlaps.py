@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 
-from sysdyn.compiler.network.primal.bounds import Interval, Sizes, without
+from sysdyn.compiler.network.primal.bounds import Interval, Sizes, box_difference
 from sysdyn.dsl.model.expression import Node, both, compare, conditional, const, index, sub, substitute
 from sysdyn.dsl.model.network import Initial, Loop
 from sysdyn.dsl.text.diagnostics import ModelError, Place
@@ -20,7 +20,7 @@ def ranges_of(loops: Sequence[Loop], sizes: Sizes, place: Place) -> Ranges:
     return {loop.index: sizes.interval(loop.first, loop.last, place) for loop in loops}
 
 
-def narrowed(loops: Sequence[Loop], within: Ranges) -> tuple[Loop, ...]:
+def restrict_loops(loops: Sequence[Loop], within: Ranges) -> tuple[Loop, ...]:
     """The loops over these ranges."""
     pairs = [(loop.index, within[loop.index]) for loop in loops]
     return tuple(Loop(name, i.first.node, i.last.node) for name, i in pairs)
@@ -35,6 +35,7 @@ def meeting(initial: Initial, at: Sequence[Node], within: Ranges, sizes: Sizes) 
     change: dict[Node, Node] = {}
     try:
         own = ranges_of(initial.loops, sizes, initial.place)
+        # index by index: both numbers or loop variables with a shift
         for said, asked in zip(initial.target.args, at, strict=True):
             a, b = sizes.affine(said, own, initial.place), sizes.affine(asked, within, initial.place)
             reach = Interval(a.offset, a.offset) if a.loop is None else own[a.loop].plus(a.offset)
@@ -42,10 +43,12 @@ def meeting(initial: Initial, at: Sequence[Node], within: Ranges, sizes: Sizes) 
                 if index(a.loop) in change:
                     return None
                 change[index(a.loop)] = sub(asked, a.offset.node)
+            # a number must lie in the statement's range
             if b.loop is None:
                 if not reach.holds(Interval(b.offset, b.offset)):
                     return None
                 continue
+            # ranges must meet
             shared = found[b.loop].common(reach.minus(b.offset))
             if not shared.size:
                 return None
@@ -63,7 +66,7 @@ def untold(initials: Sequence[Initial], at: Sequence[Node], within: Ranges, size
     """The parts of the ranges in which no statement is about elements `at`."""
     found = (meeting(initial, at, within, sizes) for initial in initials)
     holes = (tuple(m[0].values()) for m in found if m is not None)
-    yield from (dict(zip(within, box, strict=True)) for box in without(tuple(within.values()), *holes))
+    yield from (dict(zip(within, box, strict=True)) for box in box_difference(tuple(within.values()), *holes))
 
 
 def initially(initials: Sequence[Initial], at: Sequence[Node], within: Ranges, sizes: Sizes) -> Node | None:

@@ -12,7 +12,7 @@ from collections.abc import Sequence
 
 from sysdyn.compiler.network.primal.balances import MULTIPLIER, WALK, ZERO, Effort
 from sysdyn.compiler.network.primal.bounds import Affine, Bound, Interval, Picked
-from sysdyn.compiler.network.primal.incidence import PLUS, Touch, unrolled
+from sysdyn.compiler.network.primal.incidence import PLUS, Touch, unrolling_error
 from sysdyn.compiler.network.primal.reading import Range, Ranges, Rewriter
 from sysdyn.dsl.model.expression import Node, add, const, index, linear, neg, reduction, sub, var
 from sysdyn.dsl.text.diagnostics import Diagnostic, ModelError
@@ -49,13 +49,13 @@ class Potentials:
 
     def read(self, reader: Rewriter, node: Node, ranges: Ranges, active: tuple[Node, ...]) -> Node:
         """Effort of a node: against the reference, less that of the ground where this is not the reference."""
-        effort = self.known(reader, node.data[0], node.args, ranges)
+        effort = self.effort_of_node(reader, node.data[0], node.args, ranges)
         value = self._raw(reader, effort, node.args, ranges)
         if effort.ground is not None:
             value = sub(value, self._raw(reader, self.efforts[effort.ground][0], (), ranges))
         return reader.resolve(value, ranges, active)
 
-    def known(self, reader: Rewriter, name: str, at: tuple[Node, ...], ranges: Ranges) -> Effort:
+    def effort_of_node(self, reader: Rewriter, name: str, at: tuple[Node, ...], ranges: Ranges) -> Effort:
         """How the effort of a node is read."""
         found = self.efforts.get(name, [])
         if not found:
@@ -73,6 +73,7 @@ class Potentials:
         return add(best.base, *best.terms)
 
     def _path(self, reader: Rewriter, effort: Effort, at: tuple[Node, ...], touch: Touch, ranges: Ranges) -> _Path:
+        """The way from a node to one whose effort is known: terms along merged elements, periods of a run summed up."""
         terms: list[Node] = []
         visits: list[_Visit] = []
         kinetic = 0
@@ -81,11 +82,12 @@ class Potentials:
             kinetic += touch.element.branch.kind == "kinetic"
             term, name, at = _step(touch, at)
             terms.append(term)
-            effort = self.known(reader, name, at, ranges)
+            effort = self.effort_of_node(reader, name, at, ranges)
             arrival = touch
             if effort.how == WALK:
                 touch = _other(effort, arrival)
                 back = next((v for v in visits if v.effort == effort and v.touch == touch), None)
+                # the same cell and element as before: a period
                 if back is not None:
                     terms, at, effort, name = self._run(reader, visits, back, (effort, at), terms, ranges)
                     visits = []
@@ -106,9 +108,10 @@ class Potentials:
         before, behind = reader.affine(start.at, ranges), reader.affine(now[1], ranges)
         shifts = [b.offset.value - a.offset.value for a, b in zip(before, behind, strict=True)]
         along = [d for d, s in enumerate(shifts) if s]
+        # a period that does not move on by one index has no sum over a loop
         if len(along) != 1 or abs(shifts[along[0]]) != 1:
             place = reader.place or start.effort.cell.place
-            raise unrolled(f"the effort of node {start.effort.node} along its series class", place)
+            raise unrolling_error(f"the effort of node {start.effort.node} along its series class", place)
         d, step = along[0], shifts[along[0]]
         self._serial += 1
         counter = f"#w{self._serial}"
@@ -118,28 +121,30 @@ class Potentials:
         period: list[Node] = []
         limits: list[Bound] = []
         effort, touch = start.effort, start.touch
+        # one period at a counter, and how far each of its cells reaches
         for _ in visits[visits.index(start) :]:
             limits += _limits(effort, reader.affine(at, own), counter, step)
             term, name, at = _step(touch, at)
             period.append(term)
-            effort = self.known(reader, name, at, own)
+            effort = self.effort_of_node(reader, name, at, own)
             touch = _other(effort, touch) if effort.how == WALK else touch
+        # up to where the first of them ends
         end = (max if step < 0 else min)(limits, key=lambda b: b.value)
         first, last = (end.node, start.at[d]) if step < 0 else (start.at[d], end.node)
         total = reduction("sum", counter, first, last, add(*period))
         beyond = linear(float(step), ((1.0, end.node),))
         at = (*start.at[:d], beyond, *start.at[d + 1 :])
         name = start.effort.node
-        return [*terms[: start.behind], total], at, self.known(reader, name, at, ranges), name
+        return [*terms[: start.behind], total], at, self.effort_of_node(reader, name, at, ranges), name
 
 
 def _step(touch: Touch, at: tuple[Node, ...]) -> tuple[Node, str, tuple[Node, ...]]:
     """Through a branch: its effort with the sign of e(here) = e(there) +- e_branch, and the node there."""
     loops = touch.loops_at(at)
     element = touch.element
-    effort = var(element.name, "be", *(a.at(loops) for a in element.at))
+    effort = var(element.name, "be", *(a.substitute_loops(loops) for a in element.at))
     other = element.ends[1 - touch.end]
-    return effort if touch.end == PLUS else neg(effort), other.node, tuple(a.at(loops) for a in other.at)
+    return effort if touch.end == PLUS else neg(effort), other.node, tuple(a.substitute_loops(loops) for a in other.at)
 
 
 def _other(effort: Effort, arrival: Touch) -> Touch:

@@ -14,7 +14,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 
 from sysdyn.compiler.network.primal.bounds import Sizes
-from sysdyn.compiler.network.primal.overlaps import narrowed, ranges_of, untold
+from sysdyn.compiler.network.primal.overlaps import ranges_of, restrict_loops, untold
 from sysdyn.dsl.model.network import Branch, Initial, Network
 from sysdyn.dsl.text.diagnostics import ModelError
 
@@ -44,7 +44,7 @@ def foremost(initials: Sequence[Initial], branches: Sequence[Branch], sizes: Siz
     kept: list[Initial] = []
     for k, initial in enumerate(initials):
         book = books[_key(initial, kinds)] if _of_an_unknown(initial) else None
-        kept += [initial] if book is None else _left(initial, book.before((k, initial)), sizes)
+        kept += [initial] if book is None else _remaining_parts(initial, book.before((k, initial)), sizes)
     return tuple(kept)
 
 
@@ -89,8 +89,8 @@ def _rank(k: int, initial: Initial) -> tuple[int, bool, int]:
     return initial.depth, not initial.fixed, -k
 
 
-def _left(initial: Initial, others: Sequence[Initial], sizes: Sizes) -> Iterator[Initial]:
+def _remaining_parts(initial: Initial, others: Sequence[Initial], sizes: Sizes) -> Iterator[Initial]:
     """What no statement that goes before is about."""
     within = ranges_of(initial.loops, sizes, initial.place)
     for rest in untold(others, initial.target.args, within, sizes):
-        yield replace(initial, loops=narrowed(initial.loops, rest))
+        yield replace(initial, loops=restrict_loops(initial.loops, rest))

@@ -13,18 +13,18 @@ from dataclasses import field
 from typing import TypeVar
 
 from sysdyn.compiler.network.primal.bounds import Affine, Bound, Box, Interval, Picked, Sizes, box_holds
-from sysdyn.compiler.network.primal.incidence import Contact, Element, unrolled
+from sysdyn.compiler.network.primal.incidence import Contact, Element, unrolling_error
 from sysdyn.compiler.network.primal.series import Member
 from sysdyn.dsl.model.calculus import time_derivative
 from sysdyn.dsl.model.expression import (
     Node,
     add,
+    combine_terms,
     const,
     index,
     linear,
     param,
     rebuild,
-    reduced,
     reduction,
     scale,
     sub,
@@ -165,12 +165,13 @@ class Rewriter:
             if node.op == "var" and node.data[1] in KINDS:
                 done[node] = self._read(node, ranges, active)
             elif node.op == "reduce":
-                done[node] = self._reduced(node, (done[node.args[0]], done[node.args[1]]), ranges, active)
+                done[node] = self._rewrite_reduction(node, (done[node.args[0]], done[node.args[1]]), ranges, active)
             else:
                 done[node] = rebuild(node, tuple(done[a] for a in node.args))
         return done[root]
 
-    def _reduced(self, node: Node, ends: tuple[Node, Node], ranges: Ranges, active: tuple[Node, ...]) -> Node:
+    def _rewrite_reduction(self, node: Node, ends: tuple[Node, Node], ranges: Ranges, active: tuple[Node, ...]) -> Node:
+        """A reduction whose body reads the network: rewritten, cut in two where its range runs over several boxes."""
         operator, name = node.data
         body = node.args[2]
         if not touches_network(body):
@@ -185,24 +186,31 @@ class Rewriter:
                 raise
             self._check(found, {name: own})
             halves = _halves(Loop(name, *ends), found.at)
-            parts = [self._reduced(node, (h.first, h.last), ranges, active) for h in halves]
-        return reduced(operator, parts)
+            parts = [self._rewrite_reduction(node, (h.first, h.last), ranges, active) for h in halves]
+        return combine_terms(operator, parts)
 
     def _read(self, node: Node, ranges: Ranges, active: tuple[Node, ...]) -> Node:
+        """What a variable of nodes and branches is in coordinates; E105 of a circle, E102 of a quantity that is not
+        there.
+        """
         if node in active:
             text = f"{node.data[0]} is defined in a circle: {to_text(node)}"
             raise ModelError([Diagnostic("E105", text, self.place)])
         name, kind, order = node.data
         inside = (*active, node)
+        # a node that is a coordinate
         if kind in ("nq", "nf", "np"):
             return var(name, kind[1], *node.args, order=order)
         if kind in CLASSES:
             return var(name, f"x{kind[1:]}", *node.args)
+        # derivatives of what the variable itself is
         if order:
             plain = self.resolve(var(name, kind, *node.args), ranges, active)
             return self._derivative(plain, node)
+        # by potentials
         if kind == "ne":
             return self.book.nodes(self, node, ranges, inside)
+        # of a branch: by the element that holds the reference
         piece = self.piece(name, node.args, ranges)
         if kind in ("bq", "bf"):
             return self._moving(node, piece, ranges, inside)
@@ -215,6 +223,7 @@ class Rewriter:
             held = self.book.sticking.get(name, ()) if kind == "be" else ()
             return add(found, *(var(label, "mu", *node.args) for label in held)) if held else found
         plain_ends = piece.element.ends
+        # between effort nodes: the difference of potentials
         if kind == "be" and len(plain_ends) == 2 and piece.element.branch.domain.common == "effort":
             plus, minus = (self._end(c, "ne", piece, node.args) for c in plain_ends)
             return self.resolve(sub(plus, minus), ranges, inside)
@@ -252,14 +261,15 @@ class Rewriter:
         if contact.node.startswith("#ground ") and kind != "ne":
             return const(0.0)
         loops = piece.element.loops_at(at)
-        return var(contact.node, kind, *(a.at(loops) for a in contact.at))
+        return var(contact.node, kind, *(a.substitute_loops(loops) for a in contact.at))
 
     def at_piece(self, root: Node, piece: IndexBox, at: tuple[Node, ...]) -> Node:
         """An expression over an element's loops at the indices of its name; sums inside get variables of their own."""
         change = {index(name): node for name, node in piece.element.loops_at(at).items()}
-        return substitute(self._renamed(root), change)
+        return substitute(self._rename_loops(root), change)
 
-    def _renamed(self, root: Node) -> Node:
+    def _rename_loops(self, root: Node) -> Node:
+        """An expression whose reductions have loop variables of their own, so that it can be put into others."""
         done: dict[Node, Node] = {}
         nodes = topological([root])
         if all(node.op != "reduce" for node in nodes):
@@ -290,16 +300,18 @@ class Rewriter:
         places = self.affine(at, ranges)
         held = {loop: r.interval for loop, r in ranges.items()}
         reach = tuple(a.over(held) for a in places)
+        # one box holds all of it
         for k, box in enumerate(boxes):
             if len(box) == len(reach) and box_holds(box, reach):
                 return k
         corner = tuple(Interval(i.first, i.first) for i in reach)
+        # it begins in one: cut where that ends
         for box in boxes:
             if len(box) == len(corner) and box_holds(box, corner):
                 k = next(k for k, (b, r) in enumerate(zip(box, reach, strict=True)) if not b.holds(r))
                 loop = places[k].loop
                 if loop is None:
-                    raise unrolled(f"{name} by a table of indices", self.place)
+                    raise unrolling_error(f"{name} by a table of indices", self.place)
                 raise _BoxSplitError(loop, box[k].last.plus(1).minus(places[k].offset), name)
         text = ", ".join(str(i.first.value) for i in reach)
         raise ModelError([Diagnostic("E805", f"{name}[{text}] is outside its range", self.place)])

@@ -76,10 +76,16 @@ def series(incidence: Incidence, read: frozenset[str]) -> Series:
 
 def _key(link: Link) -> tuple[object, ...]:
     """What identifies a link whether or not its points were made constants."""
-    return (tuple((i.first.value, i.last.value) for i in link.box), link.a.item, link.b.item, link.sign, _fixed(link))
+    return (
+        tuple((i.first.value, i.last.value) for i in link.box),
+        link.a.item,
+        link.b.item,
+        link.sign,
+        _first_corner(link),
+    )
 
 
-def _fixed(link: Link) -> tuple[object, ...]:
+def _first_corner(link: Link) -> tuple[object, ...]:
     """Where both ends lie at the box's first corner."""
     first = [i.first.value for i in link.box]
     return tuple((0 if k is None else first[k]) + c.value for end in (link.a, link.b) for k, c in end.at)
@@ -125,6 +131,7 @@ class _Class:
 
 
 def _classes(flowing: Sequence[Element], likeness: IndexClasses) -> tuple[tuple[Coordinate, ...], tuple[Member, ...]]:
+    """Coordinates of the classes of equal flows, and the members of each class with sign and indices."""
     classes = sorted((_class(m, flowing, likeness) for m in likeness.groups().values()), key=lambda c: c.leader)
     named = [_family(c, flowing, likeness) for c in classes]
     plain = [(name, box) for name, box, whole in named if whole]
@@ -132,19 +139,20 @@ def _classes(flowing: Sequence[Element], likeness: IndexClasses) -> tuple[tuple[
     taken = {p.name for p in parts(plain)}
     coordinates: dict[str, Coordinate] = {}
     members: list[Member] = []
+    # a class over a whole family keeps its name and range
     for c, (name, box, whole) in zip(classes, named, strict=True):
         if whole:
             part = next(names)
             own, shape = part.name, shape_of(part.box)
         else:
-            own, shape = _unused(name, taken), shape_of(tuple(box[k] for k in c.kept))
+            own, shape = _unique_name(name, taken), shape_of(tuple(box[k] for k in c.kept))
             taken.add(own)
         coordinates.setdefault(own, _coordinate(own, shape, flowing[c.leader[0]]))
         members += _members(c, own, flowing, likeness)
     return tuple(coordinates.values()), tuple(_fewer(members))
 
 
-def _unused(name: str, taken: set[str]) -> str:
+def _unique_name(name: str, taken: set[str]) -> str:
     if name not in taken:
         return name
     return next(n for k in range(2, len(taken) + 3) if (n := f"{name}.{k}") not in taken)
@@ -155,24 +163,24 @@ def _class(members: list[tuple[Cell, int]], flowing: Sequence[Element], likeness
     stores = [m for m in members if flowing[m[0][0]].branch.kind == "potential"]
     leader, sign = (stores or members)[0]
     element = flowing[leader[0]]
-    tied = {d for d, k in enumerate(leader[1]) if likeness.collapsed(leader, likeness.axis(leader[0], d)[0], k)}
-    if any(_tied(cell, likeness) for cell, _ in members) and not likeness.extended(leader):
+    tied = {d for d, k in enumerate(leader[1]) if likeness.is_collapsed(leader, likeness.axis(leader[0], d)[0], k)}
+    if any(_has_tied_elements(cell, likeness) for cell, _ in members) and not likeness.free_dimensions(leader):
         return _Class(leader, sign, tuple(members), ())
     kept = tuple(k for k, a in enumerate(element.at) if a.loop is None or element.loops.index(a.loop) not in tied)
     return _Class(leader, sign, tuple(members), kept)
 
 
-def _tied(cell: Cell, likeness: IndexClasses) -> bool:
-    return any(likeness.collapsed(cell, likeness.axis(cell[0], d)[0], k) for d, k in enumerate(cell[1]))
+def _has_tied_elements(cell: Cell, likeness: IndexClasses) -> bool:
+    return any(likeness.is_collapsed(cell, likeness.axis(cell[0], d)[0], k) for d, k in enumerate(cell[1]))
 
 
 def _family(c: _Class, flowing: Sequence[Element], likeness: IndexClasses) -> tuple[str, Box, bool]:
     element = flowing[c.leader[0]]
-    box = _named(element, likeness.box(c.leader))
+    box = _box_of_indices(element, likeness.box(c.leader))
     return element.name, box, len(c.kept) == len(element.at)
 
 
-def _named(element: Element, box: Box) -> Box:
+def _box_of_indices(element: Element, box: Box) -> Box:
     """A box of loop variables as one of the name's indices."""
     ranges = dict(zip(element.loops, box, strict=True))
     return tuple(a.over(ranges) for a in element.at)
@@ -184,6 +192,7 @@ def _coordinate(name: str, shape: Shape, leader: Element) -> Coordinate:
 
 
 def _members(c: _Class, name: str, flowing: Sequence[Element], likeness: IndexClasses) -> Iterable[Member]:
+    """Elements of a class by the leader's indices; those along which all are tied have one value."""
     leader = flowing[c.leader[0]]
     first = likeness.box(c.leader)
     for cell, sign in c.members:
@@ -191,19 +200,21 @@ def _members(c: _Class, name: str, flowing: Sequence[Element], likeness: IndexCl
         own = {likeness.axis(cell[0], d)[0]: d for d in range(len(element.loops))}
         at: list[tuple[int | None, Bound]] = []
         for k, place in enumerate(leader.at):
+            # a fixed index
             if place.loop is None:
                 at.append((None, place.offset))
                 continue
             d = leader.loops.index(place.loop)
             axis, offset = likeness.axis(c.leader[0], d)
+            # the index moves along, but for a shift
             if k in c.kept and axis in own and cell[1][own[axis]] == c.leader[1][d]:
                 mine = likeness.axis(cell[0], own[axis])[1]
                 at.append((element.place_of(element.loops[own[axis]]), mine.minus(offset)))
             else:
                 at.append((None, first[d].first))
-        leads = cell == c.leader and not _tied(cell, likeness)
+        leads = cell == c.leader and not _has_tied_elements(cell, likeness)
         kept = tuple(at[k] for k in c.kept)
-        box = _named(element, likeness.box(cell))
+        box = _box_of_indices(element, likeness.box(cell))
         yield Member(element, box, sign * c.sign, name, kept, leader, tuple(at), leads)
 
 

@@ -35,7 +35,7 @@ class Slopes:
         except ModelError:  # binding says what is wrong
             return None
 
-    def assigned(self, node: Node) -> bool:
+    def reads_assigned(self, node: Node) -> bool:
         """Whether the expression reads a parameter that events assign."""
         return reads(node, self._network.discretes)
 
@@ -52,10 +52,10 @@ class Slopes:
         self.decided.append(replace(found, flat=flat))
         return flat
 
-    def divided(self, coupling: Coupling) -> bool:
+    def may_divide(self, coupling: Coupling) -> bool:
         """Whether the law of a two-port may be divided by its ratio: not by one that moves or is zero."""
         ratio = coupling.ratio
-        if is_const(ratio) or variables(ratio) or self.assigned(ratio):
+        if is_const(ratio) or variables(ratio) or self.reads_assigned(ratio):
             return is_const(ratio) and not is_const(ratio, 0.0)
         found = Slope(coupling.stem, ratio, coupling.loops, False, coupling.place)
         whole = self._parameters is None or bool(_values(found, self._parameters).all())
@@ -78,7 +78,7 @@ class Slopes:
 
 
 def _values(slope: Slope, parameters: Parameters) -> NDArray[np.float64]:
-    return over(slope.loops, (slope.expression,), parameters.checked(slope.place))[0]
+    return over(slope.loops, (slope.expression,), parameters.lookup_at_place(slope.place))[0]
 
 
 def check_slopes(network: Network, parameters: Parameters) -> None:
@@ -94,13 +94,16 @@ def check_slopes(network: Network, parameters: Parameters) -> None:
         if wrong.any():
             name, text = slope.name.partition("#")[0], to_text(slope.expression)
             help_ = "a formulation in which the law is explicit"
+            # left out because it was zero
             if slope.flat:
                 message = f"the law of {name} was compiled for {text} = 0, which is now {values[wrong.argmax()]:g}"
                 help_ = "compile the model with that value"
+            # a root was chosen by the sign
             elif slope.sign:
                 told = f"{text} {'>' if slope.sign > 0 else '<'} 0"
                 message = f"the law of {name} was compiled for {told}, which is now {values[wrong.argmax()]:g}"
                 help_ = "compile the model with that value"
+            # divided by
             else:
                 some = "" if wrong.all() else " in some of its elements"
                 message = f"the law of {name} cannot be inverted: {text} is zero{some}"

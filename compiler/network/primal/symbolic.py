@@ -29,7 +29,7 @@ class Algebra:
             self._objects[node] = sign * symbol
             self._nodes[symbol] = mul(const(float(sign)), node)
 
-    def simplified(self, root: Node) -> Node | None:
+    def simplify(self, root: Node) -> Node | None:
         """The expression over one denominator, its factors apart."""
         return self._node(self._sympy.factor(self._sympy.together(self._object(root))))
 
@@ -39,25 +39,28 @@ class Algebra:
         The law may hold one square root; freed of it, the equation is of the second degree in v or v^2.
         """
         sympy = self._sympy
-        for root in self._freed(self._object(law) - self._w):
+        for root in self._rationalize_root(self._object(law) - self._w):
             node = self._node(sympy.factor(root / self._w if over_value else root))
             if node is not None:
                 yield node
 
-    def _freed(self, equation: Any) -> Iterator[Any]:
+    def _rationalize_root(self, equation: Any) -> Iterator[Any]:
         """The roots of an equation with one square root, squared."""
         sympy, v = self._sympy, self._v
         powers = [p for p in equation.atoms(sympy.Pow) if p.exp.is_Rational and p.exp.q == 2 and p.has(v)]
+        # one square root at most
         if len({p.base for p in powers}) > 1:
             return
         r = sympy.Symbol("r", positive=True)
         whole = sympy.numer(sympy.together(equation.xreplace({p: r ** (2 * p.exp) for p in powers})))
+        # r^2 = base: the resultant has no root
         if powers:
             under = sympy.numer(sympy.together(r**2 - powers[0].base))
             whole = sympy.resultant(sympy.expand(whole), sympy.expand(under), r)
         found = sympy.Poly(sympy.expand(whole), v)
         degree, even = found.degree(), all(k % 2 == 0 for (k,) in found.monoms())
         coefficients = [sympy.factor(found.coeff_monomial(v**k)) for k in range(5)]
+        # a polynomial in v^2
         if degree in (2, 4) and even:
             for square in self._quadratic(*coefficients[0:5:2]):
                 yield from (sympy.sqrt(sympy.factor(square)), -sympy.sqrt(sympy.factor(square)))
@@ -79,6 +82,7 @@ class Algebra:
             if node in done:
                 continue
             args = [done[a] for a in node.args]
+            # exactly: doubles are fractions
             if node.op == "const":
                 done[node] = sympy.Rational(node.data)
             elif node.op == "sum":
@@ -99,6 +103,7 @@ class Algebra:
         return done[root]
 
     def _one(self, part: Any, args: list[Node]) -> Node | None:
+        """Node of a sympy object from those of its arguments; None where the language does not have it."""
         if part in self._nodes:
             return self._nodes[part]
         if part.is_Rational:

@@ -11,16 +11,16 @@ from collections.abc import Iterable, Iterator, Sequence, Set
 from dataclasses import replace
 
 from sysdyn.compiler.network.primal.bounds import Box, Sizes, meet
-from sysdyn.compiler.network.primal.contents import TELLING, told
+from sysdyn.compiler.network.primal.contents import TELLING, contents_by_text
 from sysdyn.compiler.network.primal.cycles import in_loops
 from sysdyn.compiler.network.primal.integrals import line
-from sysdyn.compiler.network.primal.overlaps import narrowed, ranges_of, untold
+from sysdyn.compiler.network.primal.overlaps import ranges_of, restrict_loops, untold
 from sysdyn.compiler.network.primal.reading import Rewriter
 from sysdyn.dsl.model.expression import Node, const, var, variables
 from sysdyn.dsl.model.network import Branch, Energy, Initial, Loop, Network
 
 
-def measured(
+def guess_contents(
     network: Network,
     constant: Set[Branch],
     initials: Sequence[Initial],
@@ -41,16 +41,19 @@ def measured(
     known = {initial.store for initial in initials}
     lengths = [b for b in network.branches if b.kind == "potential" and b.domain.common == "flow" and not reflected]
     positions = set[Branch]() if _lengths_guessed(lengths, initials) else set(lengths)
+    # stores whose contents follow from coordinates
     for b in network.branches:
         if b.kind not in TELLING or b in constant or b in positions:
             continue
         unit = b.domain.displacement if b.kind == "potential" else b.domain.effort
         for loops, content, read in _contents(b, b.loops, reader):
+            # by several coordinates: none of them is measured alone
             if len(read) > 1 or (
                 b.kind == "kinetic" and any(line(content, n) is None for n in read & _unknowns(content))
             ):
                 shared |= _owners(read)
                 continue
+            # two stores measured by one coordinate share it
             for node in read:
                 others = held.setdefault((node.data[0], node.data[1]), [])
                 box = sizes.reach(node.args, ranges_of(loops, sizes, b.place), b.place)
@@ -62,6 +65,7 @@ def measured(
                 found.append((guess, _owners(moving)))
     written, names = _written(network.energies), set[str]()
     shared -= written
+    # what shares a coordinate with a shared one is shared
     while more := {initial.store for initial, owners in found if owners & shared} - names:
         names |= more
         shared |= {owner for initial, owners in found if initial.store in more for owner in owners} - written
@@ -86,12 +90,12 @@ def _parts(b: Branch, initials: Sequence[Initial], sizes: Sizes) -> Iterator[Ini
     in words of which only the start can tell a content.
     """
     telling = list[Initial]()
-    for i, loops, content in told(b, [i for i in initials if _tells(i, b)], sizes):
+    for i, loops, content in contents_by_text(b, [i for i in initials if _tells(i, b)], sizes):
         telling.append(i)
         yield replace(i, value=content, loops=loops, fixed=False, said=not i.fixed)
     within = ranges_of(b.loops, sizes, b.place)
     zero = Initial(const(0.0), const(0.0), False, b.loops, b.place, said=False)
-    yield from (replace(zero, loops=narrowed(b.loops, ranges)) for ranges in untold(telling, b.at, within, sizes))
+    yield from (replace(zero, loops=restrict_loops(b.loops, ranges)) for ranges in untold(telling, b.at, within, sizes))
 
 
 def _tells(i: Initial, b: Branch) -> bool:

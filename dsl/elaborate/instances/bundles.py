@@ -51,14 +51,17 @@ class Bundles:
         return self._read[item]
 
     def _members(self, item: syntax.Bundle) -> Iterator[tuple[syntax.Word, DomainSymbol | BundleSymbol | None]]:
+        """Words of a bundle's members with their kinds: a domain, another bundle, None where that could not be read."""
         before: dict[str, syntax.Word] = {}
         for member in item.members:
+            # a member that could not be read leaves the bundle incomplete: the caller learns it by a None
             if isinstance(member, syntax.Broken):
                 yield item.name, None
                 continue
             kind = self._kind(member.domain)
             for word in member.names:
                 first = before.setdefault(word.name, word)
+                # `a: electrical, a: rotation`: reported once; the first one counts
                 if first is not word:
                     related = (Related("first declared here", Place(self._source, first.span)),)
                     message = f"'{word.name}' is declared twice"
@@ -108,12 +111,12 @@ def nodes(bundle: BundleNode) -> Iterator[tuple[str, NodeSymbol]]:
             yield from ((f".{name}{path}", node) for path, node in nodes(member))
 
 
-def grounded(name: str, wanted: BundleSymbol, place: Place) -> BundleNode:
+def ground_bundle(name: str, wanted: BundleSymbol, place: Place) -> BundleNode:
     """A port of several nodes, each of them bound to its domain's ground."""
     members: dict[str, NodeSymbol | PortSymbol | BundleNode] = {}
     for member, kind in wanted.members:
         if isinstance(kind, BundleSymbol):
-            members[member] = grounded(member, kind, place)
+            members[member] = ground_bundle(member, kind, place)
         else:
             members[member] = PortSymbol(member, End(None, (), kind), place)
     return BundleNode(name, members, place)

@@ -26,7 +26,7 @@ class Cast:
     nodes: tuple[Node, ...]
 
     def under(self, path: str) -> Node:
-        """The same of another instance."""
+        """Rebuild the expression of the mould in the names of an instance at `path`."""
         made: list[Node] = []
         for op, name, at, node in self.steps:
             if op == "param":

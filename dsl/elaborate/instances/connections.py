@@ -40,19 +40,24 @@ class Connections(Statements):
     def _label(self, s: syntax.Instance) -> tuple[tuple[Node, ...], Shape]:
         """Indices of a label, and first and last of each; a `for` around must show in them."""
         own = self.resolver.loops[len(self.current.loops) :]
+        # `R1: resistor(...)`: one element
         if not own and not s.decl.indices:
             return (), ()
         at = tuple(self.resolver.index(i) for i in s.decl.indices)
         shape = []
         for node, index in zip(at, s.decl.indices, strict=True):
+            # `R[i]` in `for i in 1..n`: the array has the range of the loop
             if node.op == "index":
                 shape.append(self.bounds(index))
+            # `R[i+1]`: which elements there are could not be told from the label
             elif any(n.op == "index" for n in ex.topological([node])):
                 help_ = f"{s.decl.name}[{own[-1].index}] in a 'for' over the range that is meant" if own else None
                 message = "a label is indexed by a loop variable or a number"
                 raise self.resolver.fail("E806", message, index.span, help=help_)
+            # `R[3]`: one element of a number
             else:
                 shape.append((node, node))
+        # `for i in 1..n { R: ... }` would declare one name n times
         used = set(at)
         if any(ex.index(loop.index) not in used for loop in own):
             message = f"'{s.decl.name}' stands in a 'for': its label needs the loop variable"
@@ -62,10 +67,13 @@ class Connections(Statements):
     def _ends(self, s: syntax.Instance, connection: syntax.Connection, domain: DomainSymbol | None = None) -> Ends:
         """Ends of a branch from `a -> b`, `a` (for a -> ground) or `on expr`."""
         match connection:
+            # `a -> b`
             case syntax.Across() | syntax.BindAcross():
                 plus, minus = self.end(connection.plus, domain), self.end(connection.minus, domain)
+            # `a`: to the ground of its domain
             case syntax.Single():
                 plus, minus = self.end(connection.node, domain), None
+            # `on x`: along a displacement, whose rate is the flow of the branch
             case syntax.On():
                 value = self.resolver.scalar(connection.expr)
                 self._is_displacement(value.node, connection.expr, s.decl.name)
@@ -76,12 +84,15 @@ class Connections(Statements):
                     raise self.resolver.fail("E401", message, connection.span, help=help_)
                 self._is_displacement_of(s, own or domain, value, connection)
                 return Ends(None, None, value, own or domain)
+            # `foo = a` where the component has neither a port nor an input of that name
             case _:
                 raise self.resolver.fail(
                     "E407", f"'{s.component.names[0]}' has no port or input '{connection.name.name}'", connection.span
                 )
+        # the ends tell the domain; of a generic element (`resistor`) it is that of its nodes
         found = [e for e in (plus, minus) if e is not None]
         domains = [e.domain for e in found if e.domain is not None] or ([domain] if domain else [])
+        # `ground -> ground`
         if not domains:
             raise self.resolver.fail(
                 "E403",
@@ -90,6 +101,7 @@ class Connections(Statements):
                 help="connect a node or name the coordinate",
             )
         own = domain or domains[0]
+        # one node of another domain: `R: resistor(...) a -> shaft`
         other = next((e for e in found if e.node is not None and e.domain.name != own.name), None)
         if other is not None and other.node is not None:
             first = next((e.node.name for e in found if e.node is not None and e is not other), None)
@@ -98,9 +110,11 @@ class Connections(Statements):
             if domain is None:
                 message = f"'{s.decl.name}' joins {own.name} and {other.domain.name}: {first} and {other.node.name}"
             raise self.other_domain(message, own, other, connection.span)
+        # `ground` has the domain of the other end
         plus, minus = (
             e if e is not None and e.domain is not None else End(None, (), domains[0]) for e in (plus, minus)
         )
+        # both ends at one node: the element would be short-circuited
         if plus.node is not None and plus.node is minus.node and plus.at == minus.at:
             message = f"both ends of '{s.decl.name}' are node {plus.node.name}"
             raise self.resolver.fail("E413", message, connection.span)
@@ -145,10 +159,12 @@ class Connections(Statements):
 
     def end(self, e: syntax.Expr, domain: DomainSymbol | None) -> End | None:
         """One end: a node, a port, a coordinate of a common-flow domain, or ground (None without a domain)."""
+        # `ground` is of any domain
         if isinstance(e, syntax.Name) and e.name == "ground":
             return None if domain is None else End(None, (), domain)
-        found = self.resolver.located(e)
+        found = self.resolver.locate(e)
         symbol = None if found is None else found.symbol
+        # a name that nobody declared, or an expression that is no path
         if found is None or symbol is None:
             root = e
             while isinstance(root, (syntax.Item, syntax.Member)):
@@ -157,6 +173,7 @@ class Connections(Statements):
                 raise self._unknown_node(root, domain)
             raise self._no_node(e, None)
         match symbol:
+            # inside a component: the node that the instance was connected to
             case PortSymbol():
                 if found.indices:
                     raise self.resolver.index_count(symbol.name, 0, len(found.indices), e.span)
@@ -164,6 +181,7 @@ class Connections(Statements):
                 return End(end.node, tuple(ex.substitute(a, found.change) for a in end.at), end.domain)
             case NodeSymbol():
                 return self._node_end(symbol, found.indices, found.change, e)
+            # `coord x: translation` is a node of a common-flow domain; one of a common-effort domain (a charge) is not
             case UnknownSymbol() if symbol.kind == "q" and symbol.domain is not None:
                 if symbol.domain.common == "effort":
                     help_ = f"'on {self._text(e)}' instead of '->'"
@@ -185,7 +203,7 @@ class Connections(Statements):
         nodes = [n for n in self.scope.names() if isinstance(self.scope.find(n), (NodeSymbol, PortSymbol))]
         near = nearest(root.name, nodes)
         if near is not None or domain is None or nearest(root.name, ("ground", "gnd", "GND", "vss")):
-            return self.resolver.unknown(root.name, root.span)
+            return self.resolver.report_unknown(root.name, root.span)
         if self.scope.is_broken(root.name):
             return Failed()
         message, help_ = f"unknown name '{root.name}': no node is called so", f"node {root.name}: {domain.name}"
@@ -220,7 +238,7 @@ class Connections(Statements):
     def _domain_on(self, e: syntax.Expr, value: Typed) -> DomainSymbol | None:
         """Domain of one coordinate, branch or node; else the one domain whose displacement has that dimension."""
         inner = e.expr if isinstance(e, syntax.Group) else e
-        found = self.resolver.located(inner.base if isinstance(inner, syntax.Member) and inner.name == "q" else inner)
+        found = self.resolver.locate(inner.base if isinstance(inner, syntax.Member) and inner.name == "q" else inner)
         if found is not None and isinstance(found.symbol, (UnknownSymbol, BranchSymbol, NodeSymbol)):
             return found.symbol.domain
         if found is not None and isinstance(found.symbol, PortSymbol):

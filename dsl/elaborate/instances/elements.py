@@ -48,6 +48,7 @@ class Elements(Connections):
         kind = s.component.names[0]
         at, shape = self._label(s)
         side, value, span = self._law_argument(s, kind)
+        # one branch: potential, kinetic, dissipator, effort, flow
         if kind in ONE_PORTS:
             if len(s.connections) != 1:
                 wants = "1 connection: label: component() a -> b"
@@ -59,6 +60,7 @@ class Elements(Connections):
             self._enter_element(symbol, symbol)
             self._later_law(symbol, at, side, value, kind, span, ends, s)
             return
+        # a transformer or gyrator has two branches, `E#1` and `E#2`
         connections = [c for c in s.connections if not isinstance(c, syntax.Bind)]
         if len(connections) != 2:
             raise self.resolver.fail(
@@ -126,6 +128,7 @@ class Elements(Connections):
         def part() -> None:
             """Of the loops in sight: of all, or where the law reads several statements of a label, of a part."""
             law, loops = law_of(self.resolver, symbol, whole, side, value, kind, span), self.resolver.loops
+            # set-valued friction: sticks at zero and slips else; becomes an unknown with switches
             if ex.calls(law.law, "setsign"):
                 unit = si(own_variables(symbol, whole)[law.side].dimension or NONE)
                 node = friction.of_law(self, law, symbol.family.name, whole, loops, self.place(s.span), unit)
@@ -136,6 +139,7 @@ class Elements(Connections):
             self.parts.branches.append(branch)
 
         def resolve() -> None:
+            # a law of a component's own branch has e, f, q, p in sight; a builtin's has those of its symbol
             own = self.current.bound if not kind and symbol.family.name == self.current.path else None
             own = own_variables(symbol, whole) if own is None else own
             self._hidden(value, own, symbol.name)
@@ -179,6 +183,7 @@ class Elements(Connections):
         def part() -> None:
             ratio, loops = ratio_of(self.resolver, branches, whole, kind, side, value, span), self.resolver.loops
             place = self.place(s.span)
+            # both branches have no law of their own: the coupling relates them
             for symbol, end in zip(branches, ends, strict=True):
                 name, domain, port = symbol.family.name, symbol.domain, ("port", None, None)
                 self.parts.branches.append(self.branch(name, domain, whole, loops, port, end, place))
@@ -188,6 +193,7 @@ class Elements(Connections):
             )
 
         def resolve() -> None:
+            # e1, f1, e2, f2 stand for the two sides in the ratio
             own = {**own_variables(branches[0], whole, "1"), **own_variables(branches[1], whole, "2")}
             self._hidden(value, own, s.decl.name)
             with self.resolver.inside(loops, bound), self.resolver.bound(own):

@@ -28,7 +28,7 @@ class Body:
     def __iter__(self) -> Iterator[Nested]:
         return iter(self.statements)
 
-    def of(self, kinds: Kinds) -> tuple[Nested, ...]:
+    def statements_of(self, kinds: Kinds) -> tuple[Nested, ...]:
         """The statements of these kinds, in their order."""
         found = self._kinds.get(kinds)
         if found is None:
@@ -36,7 +36,7 @@ class Body:
         return found
 
     def with_loops(self, kinds: Kinds) -> tuple[Nested, ...]:
-        """The same with all that stand in loops, whose bounds are read."""
+        """Statements of these kinds, and all that stand in loops, whose bounds are read."""
         found = self._around.get(kinds)
         if found is None:
             found = self._around[kinds] = tuple(s for s in self.statements if s[1] or isinstance(s[0], kinds))
@@ -58,17 +58,21 @@ class Interface:
         self.inputs: dict[str, syntax.Input] = {}
         self.ports: dict[str, syntax.Port] = {}
         self.branches: dict[str, syntax.Branch] = {}
-        for statement, _ in body.of((syntax.Param, syntax.Input, syntax.Port, syntax.Branch)):
+        # what an instance may give or connect, by name
+        for statement, _ in body.statements_of((syntax.Param, syntax.Input, syntax.Port, syntax.Branch)):
             match statement:
                 case syntax.Param():
                     self.parameters[statement.decl.name] = statement
                 case syntax.Input():
                     self.inputs[statement.decl.name] = statement
+                # `port a, b: electrical` declares several
                 case syntax.Port():
                     self.ports |= dict.fromkeys((d.name for d in statement.decls), statement)
+                # a branch without a name is that of the component itself
                 case syntax.Branch():
                     self.branches |= dict.fromkeys(
                         (d.name for d in statement.decls) if statement.decls else ("",), statement
                     )
+        # `param k: $u/m` is generic: each instance finds its own units
         units = [p.unit for p in self.parameters.values() if p.unit] + [i.unit for i in self.inputs.values()]
         self.generic = any(f.name.startswith("$") for unit in units for f in unit.factors)

@@ -11,7 +11,7 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager, nullcontext
 from itertools import pairwise
 
-from sysdyn.dsl.elaborate.files import FileScope, exported
+from sysdyn.dsl.elaborate.files import FileScope, library_components
 from sysdyn.dsl.elaborate.instances.head import Body, Interface
 from sysdyn.dsl.elaborate.instances.levels import choose_level, elsewhere
 from sysdyn.dsl.elaborate.instances.moulds import Moulds, charge
@@ -61,22 +61,22 @@ class Instances(Ports):
     def announce(self, body: Body) -> None:
         """Enter the labels of all instances, then elaborate each (or earlier, when another asks for it)."""
         waiting = []
-        unfinished = self._unfinished(body)
-        for statement, loops in body.of(syntax.Instance):
+        unfinished = self._unread_elements(body)
+        for statement, loops in body.statements_of(syntax.Instance):
             assert isinstance(statement, syntax.Instance)
             try:
                 if id(statement) in unfinished:
                     raise Failed
-                waiting.append(self._announced(statement, loops))
+                waiting.append(self._plan(statement, loops))
             except Failed:
                 self.scope.broken.add(statement.decl.name)
         for do in waiting:
             do()
         self.scope.announced.clear()
 
-    def _unfinished(self, body: Body) -> list[int]:
+    def _unread_elements(self, body: Body) -> list[int]:
         """Elements whose connections stand, indented, on a line that could not be read: nothing is said of them."""
-        if not body.of(syntax.Broken):
+        if not body.statements_of(syntax.Broken):
             return []
         text = self.current.source.text
         pairs = pairwise(statement for statement, _ in body)
@@ -84,31 +84,36 @@ class Instances(Ports):
             id(s) for s, then in pairs if isinstance(then, syntax.Broken) and _column(text, then) > _column(text, s)
         ]
 
-    def _announced(self, s: syntax.Instance, loops: tuple[syntax.For, ...]) -> Callable[[], None]:
+    def _plan(self, s: syntax.Instance, loops: tuple[syntax.For, ...]) -> Callable[[], None]:
         """What is to be done of an instance when it is read or its turn comes: a builtin, or a component."""
         name = s.component.names[0]
         symbol = self.scope.component(name)
         label = s.decl.name
+        # `R: dissipator(...)` is of the language itself, unless a file declares a component of that name
         if symbol is None and name in BUILTINS and len(s.component.names) == 1:
             return self._once(label, lambda: self.each([(s, loops)], self._builtin))
         if isinstance(symbol, Unsupported):
             raise Failed
+        # a component that nobody declared: a near name, or the import that would bring it
         if symbol is None:
             if self.scope.is_broken(name):
                 raise Failed
             components = [n for n in self.scope.names() if isinstance(self.scope.component(n), ComponentSymbol)]
-            library = exported()
+            library = library_components()
             near = name if name in library else nearest(name, (*components, *BUILTINS, *library))
             help_ = f"nearest name in scope: '{near}'" if near else "sysdyn std lists the library"
             if near in library and near not in components:
                 help_ = f"from std.{library[near]} import {near}"
+            # once for a name: its other instances are not reported again
             self.scope.broken.add(name)
             raise self.resolver.fail("E101", f"unknown component '{name}'", s.component.span, help=help_)
+        # `R[1..3]: resistor(...)`: a label names one element
         ranges = [i for i in s.decl.indices if isinstance(i, syntax.Range)]
         if ranges:
             help_ = f"for i in {self.source_text(ranges[0].span)} {{ {label}[i]: ... }}"
             said = f"'{label}' names one element here: a 'for' makes an array of them"
             raise self.resolver.fail("E806", said, ranges[0].span, help=help_)
+        # the parts of one array (`R[1]: ...`, `R[2]: ...`) share a symbol
         before = self.scope.symbols.get(label)
         if not isinstance(before, InstanceSymbol):
             before = InstanceSymbol(label, self.place(s.decl.span))
@@ -166,12 +171,14 @@ class Instances(Ports):
     def _component(self, symbol: InstanceSymbol, s: syntax.Instance, component: ComponentSymbol) -> None:
         """One instance of a component: its path and level, then its body; E801 where it contains itself."""
         chain = (*self.current.chain, self.current.component)
+        # a component that has itself inside, at any depth
         if component.name in chain:
             around = (*chain[chain.index(component.name) :], component.name)
             raise self.resolver.fail("E801", f"component contains itself: {' -> '.join(around)}", s.component.span)
         charge(self, s, component)
         at, shape = self._label(s)
         path = self.current.family(s.decl.name).name
+        # several statements of one label: the later ones have their range in the path
         number = len(symbol.spaces)
         scope = Scope(component.file_scope)
         space = Space(
@@ -201,23 +208,28 @@ class Instances(Ports):
         self, symbol: InstanceSymbol, s: syntax.Instance, component: ComponentSymbol, space: Space, body: Body
     ) -> None:
         """Arguments and connections, then the statements of the body, in the space of the instance."""
-        head, broken, place = body.head, body.of(syntax.Broken), self.place(s.span)
+        head, broken, place = body.head, body.statements_of(syntax.Broken), self.place(s.span)
+        # a component with lines that could not be read: what seems to be missing may stand there
         with self._unread() if broken else nullcontext():
             arguments, inputs = self._arguments(s, component, head, space)
             self.connect(Asked(s, component, head, space, inputs))
+        # `$u` in units: found from the arguments before anything is declared
         if head.generic:
             solve_units(self, s, space, head, arguments, inputs)
         symbol.spaces.append(space)
+        # parameters first: sizes of ports and bounds of loops may read them
         with self.entering(space):
             for statement, _ in broken:
                 assert isinstance(statement, syntax.Broken)
                 self.scope.broken |= statement.names
             self.declare_parameters(body, arguments)
             self.port_shapes(s, head)
-            self._required(s, place, component, head, arguments)
+            self._require_values(s, place, component, head, arguments)
         if head.inputs:
             self.bind_inputs(s, space, head, inputs)
-        with self.entering(space) if body.with_loops(DECLARED) or body.of(syntax.Instance) else nullcontext():
+        with (
+            self.entering(space) if body.with_loops(DECLARED) or body.statements_of(syntax.Instance) else nullcontext()
+        ):
             self.declare_all(body, self.declare)
             self.bodies.append((space, body))
             self.announce(body)
@@ -244,6 +256,7 @@ class Instances(Ports):
         inputs: dict[str, syntax.Expr] = {}
         others = set(space.elsewhere) - set(head.parameters) if space.path in self.levels else ()
         for arg in s.args or ():
+            # `resistor(5 ohm)`
             if arg.name is None:
                 text = self.source_text(arg.span)
                 taken: dict[str, syntax.Param | syntax.Input] = {**head.parameters, **head.inputs}
@@ -257,20 +270,25 @@ class Instances(Ports):
                 )
                 message = f"'{text}' is a positional argument: those of '{component.name}' are named"
                 raise self.resolver.fail("E404", message, arg.span, help=help_)
+            # `resistor(R = 1 ohm, R = 2 ohm)`
             if arg.name in found or arg.name in inputs:
                 message = f"'{arg.name}' of '{s.decl.name}' is given twice"
                 raise self.resolver.fail("E106", message, arg.span, help="one of the two")
+            # an input may vary: it is bound when the names of the body are known
             if arg.name in head.inputs:
                 inputs[arg.name] = arg.value
                 continue
+            # another level of the component has it, and the scene chose this one
             if arg.name in others:
                 message = f"'{s.decl.name}' has no parameter '{arg.name}' at level {space.level}: left out"
                 self.report.note("N905", message, Place(self.resolver.source, arg.span))
                 continue
+            # `resistor(a = n1)`: ports stand behind the parentheses
             if arg.name in head.ports:
                 text = self.source_text(arg.value.span)
                 message = f"'{arg.name}' of '{component.name}' is a port: it stands behind the parentheses"
                 raise self.resolver.fail("E405", message, arg.span, help=f"{component.name}(...) {arg.name} = {text}")
+            # no such name at any level
             if arg.name not in head.parameters:
                 near = nearest(arg.name, (*head.parameters, *head.inputs))
                 known = ", ".join((*head.parameters, *head.inputs))
@@ -282,7 +300,7 @@ class Instances(Ports):
             found[arg.name] = Argument(arg.value, value, bare, Place(self.resolver.source, arg.span))
         return found, inputs
 
-    def _required(
+    def _require_values(
         self, s: syntax.Instance, place: Place, component: ComponentSymbol, head: Interface, given: dict[str, Argument]
     ) -> None:
         for name, statement in head.parameters.items():

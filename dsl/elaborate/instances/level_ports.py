@@ -21,24 +21,29 @@ def level_ports(
     shown = {level: _visible(body) for level, (_, body) in levels.items()}
     first: Visible = {}
     owner: dict[tuple[str, str], str] = {}
+    # the first level that has a port tells what it is
     for level, visible in shown.items():
         for key, kind in visible.items():
             first.setdefault(key, kind)
             owner.setdefault(key, level)
+    # each other level needs the same, or an instance could not change its level
     for level, visible in shown.items():
         for key, kind in first.items():
             if visible.get(key) == kind:
                 continue
             what = f"{key[0]} '{key[1]}'" if key[1] else f"the {key[0]}"
             message = f"level '{level}' of '{name}' lacks {what}, which level '{owner[key]}' has"
+            # there, but of another domain or unit
             if key in visible:
                 message = f"{what} of '{name}' is {visible[key]} at level '{level}', {kind} at level '{owner[key]}'"
             help_ = f"{key[0]}s belong to the base, above the levels"
             report.error("E804", message, Place(source, levels[level][0].name.span), help=help_)
+            # one finding a level: the rest mostly follows from it
             break
 
 
 def _visible(body: Iterable[syntax.Statement]) -> Visible:
+    """What is visible of a body from outside: domain of each port and branch, unit of each input, by kind and name."""
     found: Visible = {}
     for statement in body:
         match statement:

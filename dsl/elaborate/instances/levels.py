@@ -22,18 +22,23 @@ def choose_level(
     """Name of the level and the statements of base and level: the scene's choice, the instance's, the default."""
     levels = {b.name.name: b for b in component.body if isinstance(b, syntax.Level)}
     base = tuple(b for b in component.body if not isinstance(b, syntax.Level))
+    # by the scene (`level motor = thermal`) or the command line
     chosen, place = frame.levels.get(path, (None, None))
+    # by the instance: `M: motor.thermal(...)`
     if chosen is None and len(s.component.names) > 1:
         chosen, place = s.component.names[1], frame.place(s.component.span)
     free = chosen is None
+    # by the component: `level simple default { ... }`
     if chosen is None:
         chosen = next((n for n, level in levels.items() if level.default), None)
+    # none is marked: a component without levels, or one of which the instance must say its choice
     if chosen is None:
         if levels:
             message = f"'{component.name}' has levels {', '.join(levels)} but no default"
             help_ = f"{component.name}.{next(iter(levels))}(...)"
             raise frame.resolver.fail("E803", message, s.component.span, help=help_)
         return None, base
+    # a choice that the component does not have
     if chosen not in levels:
         message = f"no level '{chosen}'; '{component.name}' has {', '.join(levels) or 'none'}"
         near = nearest(chosen, levels)
@@ -42,7 +47,7 @@ def choose_level(
         raise Failed
     if len(levels) > 1:
         frame.choices[path] = LevelChoice(path, chosen, tuple(levels), free)
-    bodies = {name: _extended(frame, component, levels, level, ()) for name, level in levels.items()}
+    bodies = {name: _inherit_statements(frame, component, levels, level, ()) for name, level in levels.items()}
     described = {name: (level, bodies[name]) for name, level in levels.items()}
     level_ports(component.name, described, component.source, frame.report)
     return chosen, (*base, *bodies[chosen])
@@ -60,7 +65,7 @@ def elsewhere(component: ComponentSymbol, chosen: str | None) -> dict[str, str]:
     return found
 
 
-def _extended(
+def _inherit_statements(
     frame: Instances,
     component: ComponentSymbol,
     levels: dict[str, syntax.Level],
@@ -72,17 +77,20 @@ def _extended(
         return level.body
     name = level.extends.name
     parent = levels.get(name)
+    # `level a extends b`, where b is missing, is a itself, or extends a
     if parent is None or name in chain or name == level.name.name:
         message = f"level '{level.name.name}' extends '{name}', which is no other level of '{component.name}'"
         frame.report.error("E802", message, Place(component.source, level.extends.span))
         raise Failed
-    inherited = _extended(frame, component, levels, parent, (*chain, level.name.name))
+    inherited = _inherit_statements(frame, component, levels, parent, (*chain, level.name.name))
     own = {key: b for b in level.body if (key := _label(b)) is not None}
     kept = []
+    # a statement of the parent stays, unless this level has one of the same label
     for statement in inherited:
         key = _label(statement)
         if key is None or key not in own:
             kept.append(statement)
+        # a replacement fits where the old one did: a resistor by another one-port, not by a let
         elif type(own[key]) is not type(statement) or not _alike(component, own[key], statement):
             ports = isinstance(own[key], syntax.Instance) and isinstance(statement, syntax.Instance)
             what = "an element of other ports" if ports else "a statement of another kind"

@@ -156,8 +156,8 @@ class Moulds:
             return
         space, key = symbol.spaces[0], self._key(s, body, here.scope)
         if key not in self._moulds:
-            held = [_held(it, space, name, given=name in given) for name in body.head.parameters]
-            branch, (law, _) = space.scope.symbols[""], body.of(syntax.Law)[0]
+            held = [_cast_parameter(it, space, name, given=name in given) for name in body.head.parameters]
+            branch, (law, _) = space.scope.symbols[""], body.statements_of(syntax.Law)[0]
             assert isinstance(branch, BranchSymbol)
             assert isinstance(law, syntax.Law)
             if None in held:
@@ -171,10 +171,13 @@ class Moulds:
         """Cast an instance where it stands, if there is a mould and nothing can be wrong with it."""
         here, given = it.current, {a.name or "": a.value for a in s.args or ()}
         mould = self._moulds.get(self._key(s, body, here.scope))
+        # no mould of this shape; an array; loops around; coordinates, which a cast cannot read
         if mould is None or symbol.spaces or here.prefix or not it.resolver.free or it.parts.coordinates:
             return False
+        # casts have one branch, and none contains itself
         if len(s.connections) != 1 or component.name in (*here.chain, here.component):
             return False
+        # each argument is a quantity in a unit that fitted before: nothing can be wrong with it
         for name, value in given.items():
             if not isinstance(value, syntax.Quantity) or (name, value.unit.text) not in mould.fitting:
                 return False
@@ -185,6 +188,7 @@ class Moulds:
         values = {name: it.resolver.scalar(value).node for name, value in given.items()}
         path = f"{here.path}.{s.decl.name}" if here.path else s.decl.name
         space = Likeness(here, component, path, it.place(s.decl.span), mould, ends)
+        # the value that the instance gives, or the formula of the component in its names
         for held in mould.parameters:
             name = f"{path}.{held.name}"
             node = values[held.name] if held.value is None else held.value.under(path)
@@ -197,14 +201,14 @@ class Moulds:
 def charge(it: Instances, s: syntax.Instance, component: ComponentSymbol) -> None:
     """An instance counts, whichever way it takes."""
     try:
-        budget.within(len(it.current.chain), "components are")
+        budget.check_depth(len(it.current.chain), "components are")
         budget.unfold(budget.INSTANCE, f"instances of component '{component.name}'")
     except budget.SpentError as spent:
         spent.place = spent.place or it.place(s.span)
         raise
 
 
-def _held(it: Instances, space: Space, name: str, *, given: bool) -> Held | None:
+def _cast_parameter(it: Instances, space: Space, name: str, *, given: bool) -> Held | None:
     """A parameter as an instance has it; None where another may have it otherwise."""
     parameter, symbol = it.parts.parameters.get(f"{space.path}.{name}"), space.scope.symbols.get(name)
     if parameter is None or not isinstance(symbol, ParameterSymbol) or symbol.truth:
@@ -243,7 +247,7 @@ def required_of(it: Elaborator, space: Likeness, body: Body) -> None:
         for node, place, written in mould.required:
             it.parts.requirements.append(CastRequirement(node, space.path, place, written))
         return
-    before, first, said = _learnt(it), len(it.parts.requirements), body.of(syntax.Require)
+    before, first, said = _learnt(it), len(it.parts.requirements), body.statements_of(syntax.Require)
     with it.entering(space):
         it.each(said, it.require)
     own = it.parts.requirements[first:]
@@ -273,8 +277,10 @@ def _plain(body: Body) -> bool:
 
 def _between(scope: Scope, connection: syntax.Connection, domain: DomainSymbol) -> Ends | None:
     """The ends of a branch between two nodes of a domain that stand alone, or one and ground; None: anything else."""
+    # `a -> b`
     if isinstance(connection, syntax.Across):
         said: Sequence[syntax.Expr | None] = (connection.plus, connection.minus)
+    # `a`: to ground
     elif isinstance(connection, syntax.Single):
         said = (connection.node, None)
     else:
@@ -284,6 +290,7 @@ def _between(scope: Scope, connection: syntax.Connection, domain: DomainSymbol) 
         if e is None or (isinstance(e, syntax.Name) and e.name == "ground"):
             found.append(End(None, (), domain))
             continue
+        # nodes of arrays, of other domains and undeclared ones go the long way, which reports what is wrong
         node = scope.find(e.name) if isinstance(e, syntax.Name) else None
         if not isinstance(node, NodeSymbol) or node.domain is not domain or node.family.shape or node.family.prefix:
             return None

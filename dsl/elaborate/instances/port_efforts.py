@@ -15,7 +15,7 @@ from sysdyn.dsl.model import expression as ex
 from sysdyn.dsl.model.calculus import derivative, time_derivative
 from sysdyn.dsl.model.expression import Node
 from sysdyn.dsl.model.network import Constraint, Energy, Loop, Work
-from sysdyn.dsl.model.rewriting import summed
+from sysdyn.dsl.model.rewriting import sum_over_loops
 from sysdyn.dsl.names.reactions import reaction
 from sysdyn.dsl.names.symbols import End, Space
 from sysdyn.dsl.text.diagnostics import Place
@@ -40,15 +40,17 @@ def conjugate_of(parts: NetworkBuilder, space: Space, end: End, *, rates: bool =
     name, held = end.node.family.name, "e" if end.domain.common == "flow" else "f"
     around = len(space.loops)
     terms = []
+    # branches inside that end at the port: what they carry, in at their plus and out at their minus end
     for branch in parts.branches:
         if not _inside(branch.name, branch.loops, space):
             continue
         for terminal, sign in ((branch.plus, 1.0), (branch.minus, -1.0)):
             if terminal is not None and terminal.node == name:
                 own = ex.scale(sign, ex.var(branch.name, f"b{held}", *branch.at))
-                terms.append(summed(_where(terminal.at, end.at, own), branch.loops[around:]))
+                terms.append(sum_over_loops(_where(terminal.at, end.at, own), branch.loops[around:]))
     said = [s for owner, all_ in parts.owned.items() for s in all_ if _inside(owner, s.loops, space)]
     along = [b for b in parts.branches if b.on is not None and _inside(b.name, b.loops, space)]
+    # an array of ports: no statement inside may read it, for which element it reads is not told apart
     if end.node.family.shape and space.scope.symbols.get(end.node.name) is end.node:  # a port that is an array
         for s in said:
             if any(name == n.data[0] for root in _roots(s) for n in ex.variables(root) if n.op == "var"):
@@ -57,21 +59,28 @@ def conjugate_of(parts: NetworkBuilder, space: Space, end: End, *, rates: bool =
             if any(name == n.data[0] for n in ex.variables(b.on or ex.const(0.0)) if n.op == "var"):
                 raise NotSaidError("acts on this array of ports", b.place)
         return ex.add(*terms)
+    # an electrical node: branches alone carry its flow
     if end.domain.common == "effort":
         effort = ex.var(name, "ne", *end.at)
         for s in said:
             if any(effort in ex.variables(root) for root in _roots(s)):
                 raise NotSaidError("acts on its effort", s.place)
         return ex.add(*terms)
+    # a common-flow node: energies, works and constraints inside act on it too
     coordinate = end.node.coordinate
     if coordinate is not None and coordinate.complementary:
         raise NotSaidError("acts on a momentum coordinate", end.node.place)
     q, f, p = (ex.var(name, letter if coordinate else f"n{letter}", *end.at) for letter in "qfp")
-    terms += [summed(ex.mul(ex.var(b.name, "be", *b.at), derivative(b.on, q)), b.loops[around:]) for b in along if b.on]
+    terms += [
+        sum_over_loops(ex.mul(ex.var(b.name, "be", *b.at), derivative(b.on, q)), b.loops[around:])
+        for b in along
+        if b.on
+    ]
+    # constraints of switches may give impulses, which no effort at an instant tells
     jumps = {draft.label: draft.place for draft in parts.drafts if draft.kind in ("phi", "psi", "guarded")}
     for s in said:
         if any({q, f, p} & ex.variables(root) for root in _roots(s)):
-            terms.append(summed(_asked(s, q, f, jumps, rates=rates), s.loops[around:]))
+            terms.append(sum_over_loops(_effort_of_statement(s, q, f, jumps, rates=rates), s.loops[around:]))
     return ex.add(*terms)
 
 
@@ -97,10 +106,14 @@ def _roots(s: Energy | Work | Constraint) -> Sequence[Node]:
     return (s.on, s.effort) if isinstance(s, Work) else (s.expression,)
 
 
-def _asked(s: Energy | Work | Constraint, q: Node, f: Node, jumps: dict[str, Place], *, rates: bool) -> Node:
+def _effort_of_statement(
+    s: Energy | Work | Constraint, q: Node, f: Node, jumps: dict[str, Place], *, rates: bool
+) -> Node:
     """The effort that a statement asks of the node: it is taken from where it acts."""
+    # delta W = F delta x delivers F
     if isinstance(s, Work):
         return ex.neg(ex.mul(s.effort, derivative(s.on, q)))
+    # a reaction: multiplier times the gradient; a gamma does no work
     if isinstance(s, Constraint):
         if s.name in jumps:
             raise NotSaidError("may give it impulses", s.place)
@@ -110,8 +123,10 @@ def _asked(s: Energy | Work | Constraint, q: Node, f: Node, jumps: dict[str, Pla
         return ex.neg(reaction(s.expression, s.kind == "phi", q, multiplier))
     if s.function.startswith("kept"):  # for the audit alone
         return ex.const(0.0)
+    # a spring: dV/dq
     if s.function == "V" and f not in ex.variables(s.expression):
         return derivative(s.expression, q)
+    # a damper: dD/df
     if s.function == "D":
         return derivative(s.expression, f)
     if s.function == "T*" and rates:  # Lagrange's equation: what gives its momentum a rate

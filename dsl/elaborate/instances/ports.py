@@ -45,7 +45,7 @@ class Asked:
     bound: set[str] = field(default_factory=set)
 
 
-def declared(statement: syntax.Port, name: str) -> syntax.Decl:
+def port_declaration(statement: syntax.Port, name: str) -> syntax.Decl:
     """A port's own name and indices, in a statement of several."""
     return next(d for d in statement.decls if d.name == name)
 
@@ -58,21 +58,27 @@ class Ports(Inputs):
         s, head = asked.s, asked.head
         for connection in s.connections:
             match connection:
+                # `a = n1`
                 case syntax.Bind():
                     self._bind(asked, connection)
+                # `winding = n1 -> n2`
                 case syntax.BindAcross():
                     self._bind_branch(asked, connection.name.name, connection)
+                # `n1` alone, and one port that it can mean
                 case syntax.Single() if len(head.branches) != 1 and len(head.ports) == 1:
                     self._bind_port(asked, next(iter(head.ports)), connection.node)
+                # `n1 -> n2`: the one branch of the component
                 case _:
                     if len(head.branches) != 1:
                         raise self._by_name(asked, connection)
                     self._bind_branch(asked, next(iter(head.branches)), connection)
+        # each port and branch needs a connection
         for name in (*head.ports, *head.branches):
             if name not in asked.bound:
                 what = f"port '{name}'" if name in head.ports else f"branch '{name}'" if name else "the branch"
                 help_ = f"{name} = NODE, or {name} = ground" if name else "a -> b"
                 raise self.resolver.fail("E408", f"{what} of '{s.decl.name}' is not connected", s.span, help=help_)
+        # inputs without a default need a value
         for name, statement in head.inputs.items():
             if name not in asked.inputs and statement.value is None:
                 raise self.resolver.fail(
@@ -152,7 +158,7 @@ class Ports(Inputs):
             message = f"'{word.name}' is not a domain"
             self.report.error("E202", message, Place(space.source, word.span))
             raise Failed
-        if declared(statement, name).indices:
+        if port_declaration(statement, name).indices:
             space.scope.symbols[name] = self._array_bound(s, name, wanted, value)
             return
         bound_to = self.end(value, wanted)
@@ -162,7 +168,7 @@ class Ports(Inputs):
 
     def _array_bound(self, s: syntax.Instance, name: str, wanted: DomainSymbol, value: syntax.Expr) -> NodeSymbol:
         """A port that is an array: the array of nodes that it is bound to, under the port's name."""
-        found = self.resolver.located(value)
+        found = self.resolver.locate(value)
         symbol = None if found is None else found.symbol
         coordinate = symbol if isinstance(symbol, UnknownSymbol) else None
         if coordinate is not None:
@@ -179,11 +185,11 @@ class Ports(Inputs):
     def port_shapes(self, s: syntax.Instance, head: Interface) -> None:
         """E805: ports that are arrays have the bounds of the nodes that they are bound to."""
         for name, statement in head.ports.items():
-            decl, symbol = declared(statement, name), self.scope.symbols.get(name)
+            decl, symbol = port_declaration(statement, name), self.scope.symbols.get(name)
             if not decl.indices or not isinstance(symbol, NodeSymbol):
                 continue
-            bounds = [tuple(map(self.given, b)) for b in self.shape(decl)]
-            others = [tuple(map(self.given, b)) for b in symbol.family.shape]
+            bounds = [tuple(map(self.with_instance_parameters, b)) for b in self.shape(decl)]
+            others = [tuple(map(self.with_instance_parameters, b)) for b in symbol.family.shape]
             if bounds != others:
                 shown = [", ".join(f"{to_text(a)}..{to_text(b)}" for a, b in pairs) for pairs in (bounds, others)]
                 message = f"port '{name}' of '{s.decl.name}' runs over {shown[0]}, its nodes over {shown[1]}"
@@ -194,8 +200,8 @@ class Ports(Inputs):
         """A port of several nodes, bound to a bundle of the same members or to ground."""
         place = self.place(value.span)
         if isinstance(value, syntax.Name) and value.name == "ground":
-            return bundles.grounded(name, wanted, place)
-        found = self.resolver.located(value)
+            return bundles.ground_bundle(name, wanted, place)
+        found = self.resolver.locate(value)
         if found is None or not isinstance(found.symbol, BundleNode) or not bundles.fits(wanted, found.symbol):
             message = f"port '{name}' of '{s.decl.name}' is a bundle {wanted.name}, '{self._text(value)}' is none"
             members = ", ".join(f"{m}: {kind.name}" for m, kind in wanted.members)
@@ -214,6 +220,7 @@ class Ports(Inputs):
     def _bind_branch(self, asked: Asked, name: str, connection: syntax.Connection) -> None:
         """A branch between two ends, or along an expression."""
         s, head, space = asked.s, asked.head, asked.space
+        # a name that the component does not have, or that is a port of one node
         if name not in head.branches:
             others = [other for other in (*head.branches, *head.ports) if other]
             near = nearest(name, others)
@@ -223,6 +230,7 @@ class Ports(Inputs):
             raise self.resolver.fail(
                 "E407", f"'{asked.component.name}' has no branch '{name}'", connection.span, help=said
             )
+        # two connections for one branch, as `R: resistor(...) a b` in place of `a -> b`
         if name in asked.bound:
             message = f"'{s.decl.name}: {asked.component.name}' needs 1 connection, has {len(s.connections)}"
             nodes = [self._text(c.node) for c in s.connections if isinstance(c, syntax.Single)]
@@ -233,6 +241,7 @@ class Ports(Inputs):
         if not isinstance(wanted, DomainSymbol):
             self.report.error("E202", f"'{word.name}' is not a domain", Place(space.source, word.span))
             raise Failed
+        # the ends, which have to be of the branch's domain
         ends = self._ends(s, connection, wanted)
         if ends.domain is not None and ends.on is None and ends.domain.name != wanted.name:
             end = next(e for e in (ends.plus, ends.minus) if e is not None and e.node is not None)
@@ -243,6 +252,7 @@ class Ports(Inputs):
         symbol = BranchSymbol(name or s.decl.name, family, wanted, self.place(s.decl.span))
         space.scope.symbols[name] = symbol
         space.ends[name] = ends
+        # the component's own branch: its laws may read e, f, q, p without a name
         if not name:
             space.bound.update(own_variables(symbol, space.prefix))
         asked.bound.add(name)

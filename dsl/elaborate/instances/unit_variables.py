@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 
 from sysdyn.dsl.elaborate.statements.parameters import Argument
 from sysdyn.dsl.model import dimensions as dim
-from sysdyn.dsl.model.units import NONE, Dimension, Unit, known, multiply, raised, si_text
+from sysdyn.dsl.model.units import NONE, Dimension, Unit, find_unit, multiply, power_of, si_text
 from sysdyn.dsl.names.symbols import Space, Typed
 from sysdyn.dsl.text.diagnostics import Place
 from sysdyn.dsl.tree import syntax
@@ -38,19 +38,22 @@ def solve_units(
     if not names:
         return
     equations, places = [], dict[str, Place | syntax.Span]()
+    # each argument in a unit with variables is an equation: k: $u/m given 3 N/m says $u = N
     for name, unit in declared.items():
         if not any(f.name.startswith("$") for f in unit.factors):
             continue
         if name in arguments:
             value = arguments[name].value
             given, places[name] = value.dimension if isinstance(value, Typed) else None, arguments[name].place
+        # of an input its expression tells the dimension
         elif name in inputs:
             given, places[name] = frame.resolver.scalar(inputs[name]).dimension, inputs[name].span
+        # defaulted: says nothing of the variables
         else:
             continue
         if given is not None:
             equations.append(_equation(unit, given, name, space))
-    for name, dimension in _solved(frame, s, names, equations, places).items():
+    for name, dimension in _solve_units(frame, s, names, equations, places).items():
         space.scope.units[name] = Unit(dimension, Fraction(1), si_text(dimension))
 
 
@@ -64,12 +67,12 @@ def _equation(unit: syntax.Unit, given: Dimension, name: str, space: Space) -> E
             exponents[factor.name] = exponents.get(factor.name, Fraction(0)) + power
         elif factor.name != "1":
             own = space.scope.unit(factor.name)
-            found = own.dimension if own else (known(factor.name) or (NONE, 1))[0]
+            found = own.dimension if own else (find_unit(factor.name) or (NONE, 1))[0]
             rest = multiply(rest, found, -power)
     return exponents, rest, name
 
 
-def _solved(
+def _solve_units(
     frame: Instances,
     s: syntax.Instance,
     names: set[str],
@@ -77,30 +80,32 @@ def _solved(
     places: Mapping[str, Place | syntax.Span],
 ) -> dict[str, Dimension]:
     """What the variables are; E209 where equations do not tell, or contradict each other."""
-    found = _eliminated(names, equations)
+    found = _eliminate(names, equations)
+    # no argument has the variable in its unit
     if isinstance(found, str):
         message = f"unit variable {found} of '{s.decl.name}' is not determined"
         raise frame.resolver.fail("E209", message, s.span, help="give an input or parameter that has it")
     if isinstance(found, dict):
         return found
+    # a contradiction: leaving out one argument in turn shows whether it alone is odd
     odd = {
         e[2]: rest
         for e in equations
-        if isinstance(rest := _eliminated(names, [o for o in equations if o is not e]), dict)
+        if isinstance(rest := _eliminate(names, [o for o in equations if o is not e]), dict)
     }
     if len(odd) == 1:  # the others agree
         ((name, rest),) = odd.items()
         exponents, left, _ = next(e for e in equations if e[2] == name)
         for variable, power in exponents.items():
             left = multiply(left, rest[variable], -power)
-        missing = dim.show(raised(left, -1))
+        missing = dim.show(power_of(left, -1))
         message = f"'{name}' of '{s.decl.name}' contradicts what the others say of its unit"
         raise frame.resolver.fail("E209", message, places.get(name, s.span), help=f"a factor in {missing} is missing")
     message = _contradiction(s.decl.name, *found, equations)
     raise frame.resolver.fail("E209", message, s.span)
 
 
-def _eliminated(
+def _eliminate(
     names: set[str], equations: list[Equation]
 ) -> dict[str, Dimension] | tuple[Equation, dict[str, Equation]] | str:
     """Gaussian elimination, one variable after the other: what they are; an equation that contradicts, and what each
@@ -109,6 +114,7 @@ def _eliminated(
     rows = [(dict(e), d, n) for e, d, n in equations]
     solved: list[tuple[str, dict[str, Fraction], Dimension]] = []
     told: dict[str, Equation] = {}
+    # forward: one equation tells the variable, the others lose it
     for variable in sorted(names):
         pivot = next((r for r in rows if r[0].get(variable)), None)
         if pivot is None:
@@ -117,13 +123,15 @@ def _eliminated(
         told[variable] = pivot
         factor = pivot[0][variable]
         exponents = {k: v / factor for k, v in pivot[0].items() if k != variable and v}
-        value = raised(pivot[1], 1 / factor)
+        value = power_of(pivot[1], 1 / factor)
         solved.append((variable, exponents, value))
-        rows = [_without(r, variable, exponents, value) for r in rows]
+        rows = [_substitute(r, variable, exponents, value) for r in rows]
+    # an equation without variables that is not 1 = 1
     wrong = next((r for r in rows if r[1]), None)
     if wrong is not None:
         return wrong, told
     found: dict[str, Dimension] = {}
+    # back substitution
     for variable, exponents, value in reversed(solved):
         for other, power in exponents.items():
             value = multiply(value, found[other], -power)
@@ -138,11 +146,11 @@ def _contradiction(label: str, wrong: Equation, told: dict[str, Equation], equat
     first = told.get(variable)
     if first is None or any(len(e[0]) > 1 or abs(e[0][variable]) != 1 for e in (first, alone)):
         return f"the unit variables of '{label}' contradict each other at '{wrong[2]}' (off by {dim.show(wrong[1])})"
-    one, other = (dim.show(raised(e[1], 1 / e[0][variable])) for e in (first, alone))
+    one, other = (dim.show(power_of(e[1], 1 / e[0][variable])) for e in (first, alone))
     return f"unit variable {variable} of '{label}' is {one} by '{first[2]}' and {other} by '{wrong[2]}'"
 
 
-def _without(row: Equation, variable: str, exponents: dict[str, Fraction], value: Dimension) -> Equation:
+def _substitute(row: Equation, variable: str, exponents: dict[str, Fraction], value: Dimension) -> Equation:
     power = row[0].get(variable, Fraction(0))
     if not power:
         return row

@@ -120,7 +120,7 @@ def _unit(elaborator: Elaborator, source: SourceText, expression: syntax.Expr) -
     resolver = elaborator.resolver
     report, resolver.report = resolver.report, Report()
     try:
-        with resolver.within(elaborator.space.scope, source):
+        with resolver.entering_scope(elaborator.space.scope, source):
             value = resolver.resolve(expression)
     except Failed:
         return None
@@ -148,14 +148,17 @@ class _Walk:
     def inside(self, scope: Scope, shown: str, read: str, around: int) -> Iterator[_Candidate]:
         """shown, read: the path to the scope, with its dot; around: how many indices that path holds."""
         for name, symbol in scope.symbols.items():
+            # the branch of the component itself: `R1.e`
             if isinstance(symbol, BranchSymbol) and not name:
                 own = shown.removesuffix("."), read.removesuffix(".")
                 yield from _candidates(own, "element", _BRANCH, symbol.domain)
+            # all that is inside of an instance, of an array each part
             elif isinstance(symbol, InstanceSymbol):
                 for space in symbol.spaces:
                     above, here = self._indices(space.around[around:])
                     inner = space.scope
                     yield from self.inside(inner, f"{shown}{name}{above}.", f"{read}{name}{here}.", len(space.around))
+            # the nodes of a bundle, each under its member's name
             elif isinstance(symbol, BundleNode):
                 for member, node in bundles.nodes(symbol):
                     yield from self._members(node, f"{shown}{name}", f"{read}{name}", member)
@@ -176,6 +179,7 @@ class _Walk:
     def _offers(self, symbol: Symbol) -> tuple[str, tuple[str, ...], Shape]:
         """What a symbol is, what follows its name where it is read, and its own indices."""
         match symbol:
+            # a displacement with rates, effort and momentum; of a momentum coordinate flow and displacement
             case UnknownSymbol(kind="q"):
                 rates = ("", "'", "''") if not symbol.complementary else ("", "'")
                 kind = "momentum" if symbol.complementary else "coordinate"
@@ -194,6 +198,7 @@ class _Walk:
                 return "two-port", _PORTS, symbol.branches[0].family.shape
             case ConstraintSymbol():
                 return "constraint", (".multiplier", ".residual"), symbol.family.shape
+            # a let or output; within loops only where the loop is known
             case Definition() if symbol.kind != "const" and (not symbol.at or id(symbol) in self.loops):
                 if symbol.implied:
                     return "", (), ()

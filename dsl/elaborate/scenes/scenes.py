@@ -20,12 +20,12 @@ from sysdyn.dsl.model.network import ElementSetting, Observation, Scene
 from sysdyn.dsl.model.unit_habits import common
 from sysdyn.dsl.model.units import NONE, Dimension, Unit, si
 from sysdyn.dsl.names.failures import Failed, SeveralError
-from sysdyn.dsl.names.habits import blamed
+from sysdyn.dsl.names.habits import unitless_parameter
 from sysdyn.dsl.names.symbols import Typed, Vector, nearest
 from sysdyn.dsl.names.unit_reading import read_unit
 from sysdyn.dsl.text.diagnostics import Place, Report, SourceText
 from sysdyn.dsl.tree import syntax
-from sysdyn.names import stored
+from sysdyn.names import trace_name
 
 _Said = TypeVar("_Said", syntax.Set, syntax.Trace)
 RESERVED = ("time", "audit", "parameters", "events", "derivatives")
@@ -90,14 +90,14 @@ class SceneReader:
                     self.model.space.scope.broken |= statement.names
                     self._lost = True
                 elif type(statement) in table:
-                    self.guarded(lambda s: table[type(s)](self, s), statement)
+                    self.carry_out(lambda s: table[type(s)](self, s), statement)
 
     def command(self, source: SourceText, s: _Said, do: Callable[[SceneReader, _Said], None]) -> None:
         """A `--set` or `--outputs` of the command line."""
-        with self.model.entering(self.model.space), self.resolver.within(self.model.space.scope, source):
-            self.guarded(lambda statement: do(self, statement), s)
+        with self.model.entering(self.model.space), self.resolver.entering_scope(self.model.space.scope, source):
+            self.carry_out(lambda statement: do(self, statement), s)
 
-    def guarded(self, do: Callable[..., None], statement: syntax.SceneStatement | syntax.TraceItem) -> None:
+    def carry_out(self, do: Callable[..., None], statement: syntax.SceneStatement | syntax.TraceItem) -> None:
         """Carry out one statement; what fails has been reported."""
         try:
             do(statement)
@@ -124,20 +124,23 @@ class SceneReader:
     # -- span and numbers ----------------------------------------------------------------------------------
 
     def _constant(self, expression: syntax.Expr, dimension: Dimension, what: str) -> Node:
-        node = self.resolver.wanted(expression, dimension, "E208", f"{what} is in {{}}, wants {dim.show(dimension)}")
+        node = self.resolver.scalar_of(expression, dimension, "E208", f"{what} is in {{}}, wants {dim.show(dimension)}")
         for inner in ex.topological([node]):
             if inner.op in ("var", "time"):
                 raise self.resolver.fail("E807", f"{what} depends on '{inner}': it must be a constant", expression.span)
         return node
 
     def _time(self, s: syntax.Time) -> None:
+        """Read `time START to STOP`: both finite instants [s], the end after the start (E912)."""
         start = self._constant(s.start, dim.TIME, f"the start '{self._text(s.start)}'")
         end = self._constant(s.stop, dim.TIME, f"the end '{self._text(s.stop)}'")
         self._once("start", start, s.span, "time")
+        # `time 0 s to inf`
         for node, text in ((start, self._text(s.start)), (end, self._text(s.stop))):
             if node.op == "const" and not math.isfinite(node.data):
                 message = f"'{text}' is no instant: a run begins and ends"
                 raise self.resolver.fail("E912", message, s.span, help="time 0 s to 10 s")
+        # an order that can be told now: parameters have no values yet
         if start.op == end.op == "const" and end.data < start.data:
             message = f"the time ends before it starts: {self._text(s.start)} to {self._text(s.stop)}"
             help_ = f"time {self._text(s.stop)} to {self._text(s.start)}"
@@ -175,6 +178,7 @@ class SceneReader:
         self._choice(s.name, SOLVERS, "solver")
         self._once("solver", s.name.name, s.span)
         options: list[tuple[str, Node]] = []
+        # `solver bdf(step = 1 ms, index = 2)`
         for arg in s.args or ():
             if arg.name is None or arg.name not in _SOLVER_OPTIONS:
                 message = f"the solver has no option '{arg.name or format_expression(arg.value)}'"
@@ -183,11 +187,13 @@ class SceneReader:
                 )
             if arg.name in dict(options):
                 raise self.resolver.fail("E106", f"'{arg.name}' of the solver is given twice", arg.span)
+            # 2v is no number: the stabilised index 2 with projected velocities
             if isinstance(arg.value, syntax.Name) and arg.value.name[0].isdigit():
                 if (arg.name, arg.value.name) != ("index", "2v"):
                     message = f"{arg.name} = {arg.value.name} of the solver"
                     raise self.resolver.fail("E607", message, arg.value.span, help="index = 0, 1, 2, 2v, 3")
                 node, self._found["velocities"] = ex.const(2.0), True
+            # options that are true or false
             elif arg.name in ("keep_implicit", "keep_flow"):
                 node = self._yes(arg.value, arg.name)
             else:
@@ -233,7 +239,7 @@ class SceneReader:
                 raise self.resolver.fail("E912", message, s.every.span, help="every 10 ms")
             self._once("every", every, s.every.span)
         for item in s.items:
-            self.guarded(self._items, item)
+            self.carry_out(self._items, item)
 
     def _items(self, item: syntax.TraceItem) -> None:
         """A traced expression; of `x[1..n].e` each element."""
@@ -250,17 +256,20 @@ class SceneReader:
             raise self.resolver.fail(
                 "E905", f"'{format_expression(item.expr)}' is an array: trace its elements", item.span
             )
-        name = item.alias.name if item.alias else stored(format_expression(item.expr))
+        name = item.alias.name if item.alias else trace_name(format_expression(item.expr))
         where = item.alias.span if item.alias else item.span
+        # `trace x as time`
         if name in RESERVED:
             raise self.resolver.fail(
                 "E911", f"trace name '{name}' belongs to the trace itself", where, help="another name with 'as'"
             )
         if any(o.name == name for o in self.observations):
             raise self.resolver.fail("E106", f"'{name}' is traced twice", where, help="another name with 'as'")
+        # a condition is traced as 1 and 0
         node = ex.conditional(value.node, ex.const(1.0), ex.const(0.0)) if value.truth else value.node
         unit = self._traced_unit(item, value)
         scaled = node
+        # `in degC`, `in mm`: the trace holds the numbers of that unit
         if unit.scale != 1 or unit.offset:
             scaled = ex.scale(float(1 / unit.scale), ex.sub(node, ex.const(float(unit.offset))))
         self._raw.setdefault(node, name)
@@ -277,7 +286,7 @@ class SceneReader:
         if value.dimension is not None and unit.dimension != value.dimension:
             message = f"'{format_expression(item.expr)}' is in {dim.show(value.dimension)}, not {unit.text}"
             missing = self.resolver.missing(value.dimension, unit.dimension, item.expr)
-            help_ = missing if blamed(missing) else f"in {common(value.dimension)}"
+            help_ = missing if unitless_parameter(missing) else f"in {common(value.dimension)}"
             help_ = "in rad or deg of an angle, in percent, or without 'in'" if value.dimension == NONE else help_
             help_ = "in rad/s, deg/s or rpm of a speed of rotation, in Hz" if help_ == "in s^-1" else help_
             help_ = "in degC" if unit.text == "C" and help_ == "in K" else help_
@@ -287,11 +296,13 @@ class SceneReader:
     def _accuracy(self, s: syntax.Accuracy) -> None:
         """What a run promises, and of which quantities."""
         value = self._constant(s.value, NONE, "the accuracy")
+        # for all that is traced
         if not s.on:
             self._once("accuracy", value, s.span, help="accuracy 1e-6 on x: another for what is named")
         if value.op == "const" and not FINEST_ACCURACY <= value.data < 1.0:
             text = f"accuracy {value.data:g}: from {FINEST_ACCURACY:g} to less than 1, what doubles can tell"
             raise self.resolver.fail("E906", text, s.value.span, help="accuracy 1e-6")
+        # for what is named: by its name in the trace, or by the expression that is traced
         names: list[str] = []
         for target in (element for written in s.on for element, _ in each_of(self.model, written)):
             if (named := self._traced_as(target)) is not None:
@@ -302,9 +313,11 @@ class SceneReader:
                     node = self.resolver.scalar(target).node
             except Failed:
                 continue  # it has been said
+            # `audit.energy` needs no trace item
             if node not in self._raw and node.op == "var" and node.data[1] == "audit":
                 names.append(f"audit.{node.data[0]}")  # in every trace
                 continue
+            # a trace item failed: perhaps the one that is meant
             if node not in self._raw and self._lost:
                 raise Failed  # it may stand there
             if node not in self._raw:

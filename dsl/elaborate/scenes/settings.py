@@ -62,18 +62,21 @@ class Settings:
         if path_of(s.target) in self.model.taken_inputs:
             return
         path = s.target.base if isinstance(s.target, syntax.Item) else s.target
+        # `set cell[1..3].R = 1 ohm`: one setting for each
         if ranges_of(path):  # a range of components
             for target, _ in each_of(self.model, path):
                 whole = replace(s.target, base=target) if isinstance(s.target, syntax.Item) else target
                 self.parameter(replace(s, target=whole))
             return
-        found = self.resolver.located(s.target)
+        # a parameter of the model or of something inside
+        found = self.resolver.locate(s.target)
         symbol = None if found is None else found.symbol
         if isinstance(symbol, Unsupported):
             raise Failed
         if found is not None and isinstance(symbol, ParameterSymbol):
             self._parameter(symbol, found, s)
             return
+        # nothing of that name: what may be meant
         root = s.target
         while isinstance(root, (syntax.Item, syntax.Member)):
             root = root.base
@@ -88,18 +91,21 @@ class Settings:
         near = near or (inside[0] if inside and (symbol is None or "." in shown) else None)
         started = f"init {shown} = ... sets an initial value" if symbol is not None else None
         own = [p for p in (*self.model.parts.parameters, *self.model.parts.inputs) if p.startswith(f"{shown}.")]
+        # `set motor = 3`: its parameters
         if isinstance(symbol, InstanceSymbol) and symbol.spaces:
             said = symbol.spaces[0].scope.symbols
             own += [f"{shown}.{n}" for n, d in said.items() if isinstance(d, Definition) and d.kind == "input"]
         if own and symbol is not None:
             near, started = None, " or ".join(f"set {p} = ..." for p in own[:3])
         help_ = f"nearest: '{near}'" if near else started
-        owner = self.resolver.located(s.target.base) if isinstance(s.target, syntax.Member) else None
+        owner = self.resolver.locate(s.target.base) if isinstance(s.target, syntax.Member) else None
+        # a parameter of a level that is not chosen
         if owner is not None and isinstance(owner.symbol, InstanceSymbol) and owner.symbol.spaces:
             other = owner.symbol.spaces[0].elsewhere.get(last)
             help_ = f"level {other} of '{shown.rpartition('.')[0]}' has it" if other else help_
         if name in self.model.parts.inputs:
             help_ = f"the whole: set {name} = [a, b, ...]"
+        # `set cell[2].u = 1 V` of an array
         if isinstance(symbol, Definition) and symbol.kind == "input":
             message = f"'{shown}' is an input in an array of components: each is given where they stand"
             help_ = f"an input of the model there: input u: ..., and {symbol.name} = u"
@@ -121,18 +127,24 @@ class Settings:
         items = value.items if isinstance(value, Vector) else (value,)
         for item in items:
             self._check_setting(symbol, item, s)
+        # of an array of components the indices of the component come first
         around = tuple(ex.substitute(n, found.change) for n in symbol.family.prefix)
         at: list[tuple[Node, ...]] = [(n,) for n in around]
         if around or not self._all(parameter, found.indices):
             at += [self._chosen(symbol, i) for i in found.indices]
         if around and not found.indices:  # of a component in an array: each element
-            bounds = ([self.model.given(ex.substitute(b, found.change)) for b in pair] for pair in symbol.shape)
+            bounds = (
+                [self.model.with_instance_parameters(ex.substitute(b, found.change)) for b in pair]
+                for pair in symbol.shape
+            )
             at += [tuple(ex.const(float(k)) for k in range(round(a.data), round(b.data) + 1)) for a, b in bounds
                    if ex.is_const(a) and ex.is_const(b)]  # fmt: skip
         nodes = tuple(i.node for i in items)
+        # a condition is stored as 1 or 0
         if symbol.truth:
             nodes = (ex.conditional(nodes[0], ex.const(1.0), ex.const(0.0)),)
         place = self.resolver.place(s.span)
+        # elements: each with its own node; ranges give all their elements
         if at:
             elements = list(itertools.product(*at))
             if len(at) != len(parameter.shape):
@@ -143,6 +155,7 @@ class Settings:
             given = nodes if isinstance(value, Vector) else nodes * len(elements)
             self.elements += [ElementSetting(parameter.name, a, n, place) for a, n in zip(elements, given, strict=True)]
             return
+        # the whole parameter: a number for all, or a list of its length
         if not self.model.fills(value, parameter.shape):
             message = f"'{symbol.name}' is given {len(items)} values, which do not fit its shape"
             raise self.resolver.fail("E805", message, s.value.span)
@@ -166,10 +179,12 @@ class Settings:
 
     def _check_setting(self, symbol: ParameterSymbol, value: Typed, s: syntax.Set) -> None:
         """E207: a setting is of the kind and the dimension of its parameter."""
+        # `set on = 3`
         if value.truth != symbol.truth:
             raise self.resolver.fail(
                 "E207", f"'{symbol.name}' is {'a condition' if symbol.truth else 'a number'}", s.value.span
             )
+        # `set R = 3 V`
         if value.dimension is not None and value.dimension != symbol.dimension:
             own = common(symbol.dimension) if symbol.dimension else dim.show(symbol.dimension)
             message = f"'{symbol.name}' is in {own} but set to {dim.show(value.dimension)}"
@@ -179,6 +194,7 @@ class Settings:
                 text = " ".join(self.resolver.source.text[s.value.span.start : s.value.span.end].split())
                 help_ = None if factor is None else f"({text})*(1 {dim.show(factor)})"
             raise self.resolver.fail("E207", message, s.value.span, help=help_)
+        # `set R = x`: parameters do not vary
         for inner in ex.topological([value.node]):
             if inner.op in ("var", "time"):
                 varies = symbol.name in self.model.parts.inputs

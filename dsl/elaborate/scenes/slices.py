@@ -51,7 +51,7 @@ def each_of(model: Elaborator, written: syntax.Expr) -> Iterator[tuple[syntax.Ex
 
 def bound_of(model: Elaborator, bound: syntax.Expr) -> int:
     """A bound of a slice, with the sizes that the scene and the command give."""
-    node = model.resolver.sized(model.resolver.whole_number(bound, "a bound"))
+    node = model.resolver.with_sizes(model.resolver.whole_number(bound, "a bound"))
     if not ex.is_const(node):
         raise model.resolver.fail("E807", "the bound of a slice depends on something without a value", bound.span)
     return int(node.data)

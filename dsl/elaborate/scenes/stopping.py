@@ -23,11 +23,12 @@ _PASSED = 1e-12
 """Of the range: what the argument of a table of one argument may pass the end by, and that of a map may not."""
 
 
-def watched(elaborator: Elaborator, observations: Iterable[Observation]) -> None:
+def watch_tables(elaborator: Elaborator, observations: Iterable[Observation]) -> None:
     """Adds the states, and what keeps them from being pruned, to the elaborator's parts."""
     tables, parts = elaborator.files.tables, elaborator.parts
     if all(t.outside != "stop" for t in tables.values()):
         return
+    # what is read of tables outside of the equations: a step does not see where their arguments leave the range
     moving = [e for e in parts.expectations if e.moment != "static"]
     asked = [(o.expression, o.place) for o in (*observations, *parts.watched)]
     asked += [(node, e.place) for e in moving for node in (e.left, e.right)]
@@ -37,6 +38,7 @@ def watched(elaborator: Elaborator, observations: Iterable[Observation]) -> None
         for node in ex.topological([root]):
             table = tables.get(node.data[0]) if node.op == "table" and node not in met else None
             met.add(node)
+            # each argument of a stopping table that moves gets a state whose rate is a table of the same range
             for k, argument in enumerate(node.args if table is not None and table.outside == "stop" else ()):
                 if table is None or not _a_rate(argument):
                     continue
@@ -44,10 +46,10 @@ def watched(elaborator: Elaborator, observations: Iterable[Observation]) -> None
                 first, last = table.points[k][0], table.points[k][-1]
                 ends = (first, last if len(node.args) == 1 else last - _PASSED * (last - first))
                 tables[name] = replace(table, name=name, method="linear", points=(ends,), values=(0.0, 0.0))
-                _integrated(elaborator, ex.table(name, argument), place)
+                _add_integral(elaborator, ex.table(name, argument), place)
 
 
-def unwatched(network: Network) -> Network:
+def drop_measuring_states(network: Network) -> Network:
     """The network without these states, and without other integrals that nothing reads: for whom no time passes."""
     measured = {s.name for s in network.states if s.measured}
     while measured:
@@ -81,7 +83,7 @@ def _states(node: ex.Node) -> set[str]:
     return {n.data[0] for n in ex.variables(node) if n.op == "var" and n.data[1] == "s"}
 
 
-def _integrated(elaborator: Elaborator, rate: ex.Node, place: Place) -> None:
+def _add_integral(elaborator: Elaborator, rate: ex.Node, place: Place) -> None:
     """A state with this rate, zero at the start, that something reads."""
     parts = elaborator.parts
     name = f"{rate.data[0]} {len(parts.watched)}"

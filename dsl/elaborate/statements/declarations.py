@@ -65,25 +65,29 @@ class Declarations(Parameters):
         if late := [s for s in statements if _takes_its_unit(s[0])]:
             named = {s.decl.name: (s, at) for s, at in late if isinstance(s, syntax.State | syntax.Discrete)}
             self.each(late if len(named) < len(late) else self.by_dependence(named), do)
-        self.each(body.of(BEGINNING), self.begin)
+        self.each(body.statements_of(BEGINNING), self.begin)
 
     def declare(self, statement: syntax.Statement) -> None:
         """One declaration; statements of other kinds are passed over."""
         match statement:
+            # `coord x: translation`
             case syntax.Coord():
                 self._coordinates(statement)
+            # `implicit F: N`: an unknown that gammas determine
             case syntax.Implicit():
                 unit = self.unit(statement.unit)
                 for decl in statement.decls:
                     family = self.current.family(decl.name, self.shape(decl))
-                    self._unknown(decl, "e", family, unit.dimension, None, False)
+                    self._enter_unknown(decl, "e", family, unit.dimension, None, False)
                     self.parts.unknowns.append(Unknown(family.name, family.whole, unit, self.place(decl.span)))
             case syntax.State():
                 self._state(statement)
             case syntax.Node():
                 self._nodes(statement)
+            # resolved when they are read first: they may read what stands below
             case syntax.Let() | syntax.Output() | syntax.Quasi():
                 self._definition(statement)
+            # a label: its multiplier and residual can be read
             case syntax.Constraint():
                 decl = statement.decl
                 family = self.current.family(decl.name)
@@ -91,7 +95,7 @@ class Declarations(Parameters):
             case syntax.Discrete():
                 events.discrete(self, statement)
 
-    def _unknown(
+    def _enter_unknown(
         self, decl: syntax.Decl, kind: str, family: Family, dimension: Dimension, domain: DomainSymbol | None, co: bool
     ) -> None:
         self.enter(UnknownSymbol(decl.name, kind, family, dimension, domain, co, self.place(decl.span)))
@@ -135,7 +139,7 @@ class Declarations(Parameters):
         conjugate, effort = (domain.displacement, domain.flow) if co else (domain.momentum, domain.effort)
         for decl in statement.decls:
             family = self.current.family(decl.name, self.shape(decl))
-            self._unknown(decl, "q", family, own.dimension, domain, co)
+            self._enter_unknown(decl, "q", family, own.dimension, domain, co)
             place = self.place(decl.span)
             self.parts.coordinates.append(
                 Coordinate(
@@ -146,10 +150,13 @@ class Declarations(Parameters):
     def begin(self, statement: syntax.Statement) -> None:
         """The value with which what a declaration names begins; nothing where the name is another's (E106)."""
         match statement:
+            # `coord x: translation = 1 m`
             case syntax.Coord() | syntax.Implicit() | syntax.Node():
                 init, decls = statement.init, statement.decls
+            # `state s = 1 m`
             case syntax.State(decl=decl, value=value) if value is not None:
                 init, decls = syntax.Initial("fixed", value, value.span), (decl,)
+            # nothing else begins with a value
             case _:
                 return
         if init is None:
@@ -158,10 +165,13 @@ class Declarations(Parameters):
             symbol = self.scope.symbols.get(decl.name)
             if not isinstance(symbol, UnknownSymbol | NodeSymbol) or symbol.place != self.place(decl.span):
                 raise Failed
+            # the kind of unknown whose value is given
             if isinstance(symbol, UnknownSymbol):
                 kind, dimension = symbol.kind, symbol.dimension
+            # an electrical node begins with its effort
             elif symbol.domain.common == "effort":
                 kind, dimension = "ne", symbol.domain.effort.dimension
+            # a mechanical node with its displacement
             else:
                 kind, dimension = "nq", symbol.domain.displacement.dimension
             self._own_initial(decl, kind, symbol.family, dimension, init)
@@ -174,7 +184,7 @@ class Declarations(Parameters):
         outer = len(self.resolver.loops)
         with ExitStack() as stack:
             at = tuple(
-                self.looped(index) or ex.index(stack.enter_context(self.resolver.loop(f"i{k + 1}", *bounds)).index)
+                self.loop_index(index) or ex.index(stack.enter_context(self.resolver.loop(f"i{k + 1}", *bounds)).index)
                 for k, (index, bounds) in enumerate(zip(decl.indices, family.shape, strict=True))
             )
             target = ex.var(family.name, kind, *family.prefix, *at)
@@ -224,7 +234,7 @@ class Declarations(Parameters):
             first = value.items[0] if isinstance(value, Vector) else value
             unit = si((first.dimension or NONE) if first is not None else NONE)
         family = self.current.family(decl.name, self.shape(decl))
-        self._unknown(decl, "s", family, unit.dimension, None, False)
+        self._enter_unknown(decl, "s", family, unit.dimension, None, False)
         self.parts.states.append(State(family.name, family.whole, unit, self.place(decl.span)))
 
     def _definition(self, statement: syntax.Let | syntax.Output | syntax.Quasi) -> None:
@@ -234,17 +244,20 @@ class Declarations(Parameters):
         dimension = self.unit(statement.unit).dimension if isinstance(statement, syntax.Quasi) else None
         at: tuple[str, ...] = ()
         implied = False
+        # `for i in 1..n { let x[i] = ... }`: a formula with loop variables
         if decl.indices and not any(isinstance(i, syntax.Range) for i in decl.indices):
             at = tuple(i.name for i in decl.indices if isinstance(i, syntax.Name))
             if len(at) != len(decl.indices):
                 raise self.resolver.fail(
                     "E806", f"'{decl.name}' is declared by its loop variables", decl.span, help="let x[i] = ..."
                 )
+        # `let x[1..3] = 2 m` gives no formula for the elements
         elif decl.indices and not isinstance(statement.value, syntax.Array):
             help_ = f"for i in ... {{ {kind} {decl.name}[i] = ... }}"
             raise self.resolver.fail(
                 "E806", f"the elements of '{decl.name}' are given by one formula", decl.span, help=help_
             )
+        # `for i in 1..n { let x = ... }`: known inside the loop alone
         elif self.resolver.bound_loops():
             at, implied = tuple(self.resolver.bound_loops()), True
         place = self.place(decl.span)

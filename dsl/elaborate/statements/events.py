@@ -85,6 +85,7 @@ def discrete(frame: ElaborationContext, s: syntax.Discrete) -> None:
     items = found.items if isinstance(found, Vector) else (found,)
     value = next((i for i in items if i.dimension is not None), items[0])
     unit = frame.unit(s.unit) if s.unit else si(value.dimension or NONE)
+    # its first value is a constant, or of t
     for item in items:
         if item.dimension is not None and item.dimension != unit.dimension:
             have = dim.show(item.dimension)
@@ -93,6 +94,7 @@ def discrete(frame: ElaborationContext, s: syntax.Discrete) -> None:
         for inner in ex.variables(item.node) - {ex.time()}:
             message = f"the initial value of '{decl.name}' depends on '{inner}'"
             raise resolver.fail("E807", message, s.value.span, help="parameters, constants and t only")
+    # a list has as many values as the array elements
     shape, place = frame.shape(decl), frame.place(decl.span)
     if not frame.fills(found, shape):
         message = f"'{decl.name}' has {len(items)} values, which do not fit its shape"
@@ -103,6 +105,7 @@ def discrete(frame: ElaborationContext, s: syntax.Discrete) -> None:
     around = tuple(n.data if n.op == "index" else f"_{k}" for k, n in enumerate(family.prefix))
     indices = (*around, *(loop.index for loop in own))
     frame.parts.parameters[family.name] = Parameter(family.name, family.whole, unit, nodes, indices, place)
+    # a parameter for all that reads it, which events may assign
     frame.parts.discretes.add(family.name)
 
 
@@ -174,12 +177,16 @@ def _enter(frame: ElaborationContext, draft: EventDraft) -> None:
 def event_of(frame: ElaborationContext, draft: EventDraft, change: dict[Node, Node]) -> Event:
     """One element of an event, with its watched values; change: numbers for the loop variables."""
 
-    def of(node: Node) -> Node:
+    def in_element(node: Node) -> Node:
         return ex.substitute(node, change) if change else node
 
-    condition = None if draft.condition is None else _watched(frame, of(draft.condition), draft.place)
-    period = None if draft.period is None else of(draft.period)
-    actions = [(of(a.target), watch(frame, of(a.value), a.dimension, a.place), a.place) for a in draft.actions]
+    condition = (
+        None if draft.condition is None else _compare_observations(frame, in_element(draft.condition), draft.place)
+    )
+    period = None if draft.period is None else in_element(draft.period)
+    actions = [
+        (in_element(a.target), watch(frame, in_element(a.value), a.dimension, a.place), a.place) for a in draft.actions
+    ]
     return Event(draft.name, condition, period, tuple(Action(*a) for a in actions), draft.place)
 
 
@@ -187,7 +194,7 @@ def _discretes(frame: ElaborationContext, root: Node) -> bool:
     return ex.reads(root, frame.parts.discretes)
 
 
-def _watched(frame: ElaborationContext, condition: Node, place: Place) -> Node:
+def _compare_observations(frame: ElaborationContext, condition: Node, place: Place) -> Node:
     """The condition with every comparison as one of an observation with zero."""
     change: dict[Node, Node] = {}
     for node in ex.topological([condition]):
@@ -215,6 +222,7 @@ def _actions(frame: ElaborationContext, actions: tuple[syntax.Action, ...]) -> t
             continue
         target, truth = _target(frame, action)
         value = frame.resolver.scalar_or_truth(action.value)
+        # `on := 3`, `n := 2 m`
         if value.truth != truth or (
             not truth and value.dimension is not None and value.dimension != (target.dimension or NONE)
         ):
@@ -225,6 +233,7 @@ def _actions(frame: ElaborationContext, actions: tuple[syntax.Action, ...]) -> t
                 help_ = frame.resolver.missing(value.dimension, target.dimension or NONE, action.value)
             message = f"{target.node} := ...: {want} expected, {have} found"
             raise frame.resolver.fail("E208", message, action.value.span, help=help_)
+        # two assignments to one variable at one instant have no order
         if any(a.target is target.node for a in found):
             raise frame.resolver.fail("E704", f"the event assigns {target.node} twice", action.span)
         found.append(Assigned(target.node, _number(value), target.dimension, frame.place(action.span)))
@@ -235,16 +244,20 @@ def _target(frame: ElaborationContext, action: syntax.Action) -> tuple[Typed, bo
     """What an action assigns: the param of a discrete variable, a state, a flow; and whether it is a condition."""
     value = frame.resolver.scalar_or_truth(action.target)
     node = value.node
+    # a discrete condition is read as `param != 0`: the param is assigned
     if value.truth and node.op == "cmp":  # a discrete condition reads `param != 0`
         node = node.args[0]
+    # `n := n + 1`
     if node.op == "param" and node.data in frame.parts.discretes:
         return Typed(node, value.dimension), value.truth
+    # `s := 0` of a state, `x' := -e*x'` of a flow: the coordinate itself does not jump
     if node.op == "var":
         name, kind, order = node.data
         if kind == "s" and order == 0:
             return value, False
         if (kind, order) in (("q", 1), ("f", 0), ("nf", 0), ("nq", 1)):
             return Typed(ex.var(name, "f", *node.args), value.dimension), False
+    # anything else; of a parameter, a displacement and a branch the help says what may be assigned
     text = " ".join(frame.resolver.source.text[action.target.span.start : action.target.span.end].split())
     message = f"event assigns {text} (only discrete variables, states and x' of a coordinate may jump)"
     help_ = f"discrete {text} = ... in place of its declaration" if node.op == "param" else None
@@ -270,28 +283,32 @@ def _instead(frame: ElaborationContext, node: Node) -> str:
 # -- constraints that hold at times --------------------------------------------------------------------------
 
 
-def guarded(frame: ElaborationContext, s: syntax.Constraint, constraint: Constraint) -> Constraint:
+def guard_constraint(frame: ElaborationContext, s: syntax.Constraint, constraint: Constraint) -> Constraint:
     """The constraint as a row; where it holds at times only, the switch that says when."""
     guard = restitution = None
+    # `while c` says when it holds, `restitution e` how it bounces
     for item in s.guards:
         if item.kind == "while":
             guard = _guard(frame, item)
         else:
             message = f"{s.kind} {s.decl.name}: restitution is in {{}}, wants a ratio"
-            restitution = frame.resolver.wanted(item.expr, NONE, "E208", message)
+            restitution = frame.resolver.scalar_of(item.expr, NONE, "E208", message)
             if ex.variables(restitution) or _discretes(frame, restitution):
                 message = f"{s.kind} {s.decl.name}: restitution is one number for the whole run; it reads what moves"
                 help_ = "a parameter; of several, a phi each, 'while' a discrete condition holds"
                 raise frame.resolver.fail("E807", message, item.expr.span, help=help_)
+            # bouncing needs an inequality of displacements, `phi x >= 0`
             if s.relation == "=" or s.kind != "phi":
                 what = "an equality" if s.relation == "=" else f"a {s.kind}"
                 message = f"{s.kind} {s.decl.name}: restitution on {what}"
                 raise frame.resolver.fail("E514", message, item.span, help="phi ... >=")
+    # holds always: an ordinary row
     if s.relation == "=" and guard is None:
         return constraint
     if s.kind == "gamma":
         what = "an inequality" if s.relation != "=" else "'while'"
         raise frame.resolver.fail("N608", f"gamma {s.decl.name}: {what} of a gamma is not supported yet", s.span)
+    # an equality that holds at times, or an inequality
     kind = "guarded" if s.relation == "=" else s.kind
     # a >= b is the row b - a: so its multiplier pushes a up and is positive
     node = ex.neg(constraint.expression) if s.relation == ">=" else constraint.expression

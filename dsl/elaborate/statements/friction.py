@@ -96,9 +96,12 @@ def relation(
     root = ex.sub(given, text)
     factors = {s: derivative(root, s) for s, _ in made}
     read = frozenset().union(*(ex.variables(n) for n in (*factors.values(), *(u for _, u in made))))
+    # terms whose unknown can be a force of its own: no factor or argument reads another's sign
     whole = {s for s, _ in made if s not in read and ex.variables(factors[s]).isdisjoint(factors)}
     senses = {s: _sense(frame, f"{s.data[0]} sense", at, loops, place) for s, _ in made}
+    # c*sense + w in place of c*s, w being zero while it slips
     slipping = {s: ex.sub(ex.mul(factors[s], senses[s]), s) for s in factors if s in whole}
+    # each term sticks as long as what the others leave of the relation is within its bound
     for s, u in made:
         _check(frame, s, u, factors[s], label, at, place)
         frame.parts.unknowns.append(Unknown(s.data[0], loop_ranges(loops), unit if s in whole else si(NONE), place))
@@ -155,10 +158,13 @@ def _close(
     (s, u, sense), (factor, rest) = unknown, terms
     name, at = s.data[0], loop_indices(loops)
     holds = _sense(frame, f"{name} holds", at, loops, place)
+    # sticking: u = 0; slipping: the unknown follows its sign
     row = ex.conditional(ex.compare("!=", holds, ex.const(0.0)), u, slips)
-    frame.said(Constraint("gamma", name, at, row, loops, si(NONE), place))
+    frame.add_statement(Constraint("gamma", name, at, row, loops, si(NONE), place))
+    # the sign of c may be either: the force that is left is counted along c
     left = ex.conditional(ex.compare(">=", factor, ex.const(0.0)), ex.neg(rest), rest)
     bound = ex.neg(factor) if absorbs else ex.call("abs", factor)
+    # c is itself a reaction (Coulomb's law with a normal force): its values are watched
     aimed = not absorbs and any(n.data[1] in ("kappa", "mu") for n in ex.variables(factor) if n.op == "var")
     aim = (factor,) if aimed else ()
     draft = Draft(name, at, loops, "relation", place, si(NONE), u, left, label, bound, sense, aim=aim, holds=holds)
@@ -187,9 +193,11 @@ def set_valued(frame: ElaborationContext, root: Node, loops: tuple[Loop, ...], p
     """
     at = loop_indices(loops)
     root = _by_sizes(root)
+    # abs(f) and hypot(f, g) of flows are set-valued; of anything else they are functions
     for node in ex.topological([root]):
         if node.op != "call" or node.data not in ("abs", "hypot") or not any(map(_rates, node.args)):
             continue
+        # inside of a sum over elements each has its own: the loop is unrolled first
         if any(n.op == "reduce" and node in ex.topological([n.args[2]]) for n in ex.topological([root])):
             continue
         bound = _factor(root, node)
@@ -197,9 +205,11 @@ def set_valued(frame: ElaborationContext, root: Node, loops: tuple[Loop, ...], p
             continue
         name = f"content of line {place.start[0]}" + (f" ({len(frame.parts.drafts)})" if frame.parts.drafts else "")
         sense = _sense(frame, f"{name} sense", at, loops, place)
+        # c*abs(f) becomes c*sense*f: the sense is 1 or -1 while it slips
         if node.data == "abs":
             _stick(frame, name, (at, loops), (node.args[0], bound, sense), place)
             root = ex.substitute(root, {node: ex.mul(sense, node.args[0])})
+        # c*hypot(f, g): a direction in the plane
         else:
             speed = _stick_in_plane(frame, name, (at, loops), (node, bound, sense), place)
             root = ex.substitute(root, {node: ex.mul(sense, speed)})
@@ -240,14 +250,17 @@ def _stick_in_plane(
     n = tuple(  # any at first: at rest there is none
         _sense(frame, f"{name} direction {k}", at, loops, place, begins) for k, begins in ((1, BESIDE), (2, 0.0))
     )
+    # two constraints hold the body while it sticks, one along and one across
     labels = (name, f"{name} across")
     for label, flow in zip(labels, flows, strict=True):
-        frame.said(Constraint("psi", label, at, flow, loops, unit, place))
+        frame.add_statement(Constraint("psi", label, at, flow, loops, unit, place))
+    # the reaction of both is compared with the bound
     multipliers = tuple(ex.var(label, "mu", *at) for label in labels)
     beside = [ex.add(f, d) for f, d in zip(flows, n, strict=True)]
     forward = ex.add(*(ex.mul(d, b) for d, b in zip(n, beside, strict=True)))
     along = ex.div(forward, ex.call("hypot", *n))
     value = ex.sub(along, ex.scale(0.5, ex.call("hypot", *beside)))
+    # the switch watches the speed along the direction, less half the speed, both beside n: positive while it slips so
     draft = Draft(
         name, at, loops, "planar", place, unit, value, ex.call("hypot", *multipliers), bound=bound, sense=sense,
         rate=time_derivative(along), aim=(*flows, *multipliers, node), direction=n,
@@ -289,6 +302,6 @@ def _stick(
     """Dry friction: a set-valued effort with its bound and the sense of the motion."""
     (at, loops), (value, bound, sense) = where, what
     unit = si(NONE)
-    frame.said(Constraint("psi", name, at, value, loops, unit, place))
+    frame.add_statement(Constraint("psi", name, at, value, loops, unit, place))
     multiplier = ex.var(name, "mu", *at)
     frame.parts.drafts.append(Draft(name, at, loops, "friction", place, unit, value, multiplier, element, bound, sense))

@@ -103,13 +103,16 @@ class Inputs(Elements):
         stack: list[syntax.Expr] = [expression]
         while stack:
             for node in walk(stack.pop()):
+                # what is read by a prime or a dot moves, or is not known yet
                 if isinstance(node, (syntax.Prime, syntax.Member, syntax.Reduction)):
                     return False
                 if isinstance(node, syntax.Name) and node.name not in seen:
                     seen.add(node.name)
                     symbol = self.scope.find(node.name)
+                    # `pi` and `inf` of the language
                     if symbol is None and node.name in ("pi", "inf"):
                         continue
+                    # a constant is as constant as its own expression
                     if isinstance(symbol, Definition) and symbol.kind == "const":
                         stack.append(symbol.expression)
                     elif not isinstance(symbol, ParameterSymbol):
@@ -122,7 +125,10 @@ class Inputs(Elements):
         for name, statement in head.inputs.items():
             with self.entering(space):
                 unit = self.unit(statement.unit)
-                shape = tuple((self.given(a), self.given(b)) for a, b in self.shape(statement.decl))
+                shape = tuple(
+                    (self.with_instance_parameters(a), self.with_instance_parameters(b))
+                    for a, b in self.shape(statement.decl)
+                )
             place, path = self.place(s.span), space.family(name).name
             if not space.prefix and path in self.given_inputs:
                 self._give(name, unit, shape, space, self.given_inputs[path])

@@ -6,7 +6,7 @@ from contextlib import nullcontext
 from typing import TypeVar
 
 from sysdyn.dsl.elaborate.instances.head import Body
-from sysdyn.dsl.elaborate.parts import ElaborationContext, declared
+from sysdyn.dsl.elaborate.parts import ElaborationContext, declarations_of
 from sysdyn.dsl.model import dimensions as dim
 from sysdyn.dsl.model import expression as ex
 from sysdyn.dsl.model.dependence import in_order
@@ -57,7 +57,7 @@ class Parameters(ElaborationContext):
     def _first(self, body: Body) -> dict[str, Stated]:
         """The parameters of a body by their names; E106 where there are two of one."""
         found: dict[str, Stated] = {}
-        for statement, loops in body.of(syntax.Param):
+        for statement, loops in body.statements_of(syntax.Param):
             assert isinstance(statement, syntax.Param)
             name = statement.decl.name
             if name in found:
@@ -83,23 +83,30 @@ class Parameters(ElaborationContext):
         return tuple(found[name] for name in order)
 
     def _parameter(self, statement: syntax.Param, given: Argument | None) -> None:
+        """Declare a parameter: its unit, shape and values, by the argument of the instance or else its default; E207 of
+        neither.
+        """
         decl = statement.decl
         place = self.place(decl.span)
         unit = self.unit(statement.unit) if statement.unit else None
         shape = self.shape(decl)
         family = self.current.family(decl.name, shape)
         own = self.resolver.loops[len(self.current.loops) :]
+        # `for i in 1..n { param R = ... }`
         if own and not decl.indices:
             raise self.resolver.fail("E806", f"'{decl.name}' needs its loop variable: {decl.name}[i]", decl.span)
         values: tuple[Node, ...] = ()
         truth = False
+        # its default
         if statement.value is not None and given is None:
             value = self.resolver.resolve(statement.value)
             values, unit, truth = self._values(statement, statement.value, value, unit, shape)
+        # an argument of the instance, in the unit of the declaration
         elif given is not None:
             if unit is None and statement.value is not None:  # the default fixes the dimension
                 unit = self._values(statement, statement.value, self.resolver.resolve(statement.value), None, shape)[1]
             values, unit, truth = self._values(statement, given.written, given.value, unit, shape, given)
+        # `param k` says neither unit nor value
         if unit is None:
             help_ = f"param {decl.name} = 3 N/m, or param {decl.name}: N/m where somebody else sets it"
             raise self.resolver.fail("E207", f"'{decl.name}' has neither a unit nor a default", decl.span, help=help_)
@@ -119,17 +126,21 @@ class Parameters(ElaborationContext):
     ) -> tuple[tuple[Node, ...], Unit, bool]:
         """Nodes of a default or an argument, and the unit that it fixes where none is declared."""
         items = value.items if isinstance(value, Vector) else (value,)
+        # a parameter is constant in a run
         for item in items:
             self._is_run_constant(item.node, statement, given)
+        # `param k[1..3] = [1, 2]`
         if not self.fills(value, shape):
             message = f"'{statement.decl.name}' has {len(items)} values, which do not fit its shape"
             help_ = None if shape or not isinstance(value, Vector) else f"param {statement.decl.name}[1..{len(items)}]"
             if given is not None:
                 help_ = None if shape else "one value"
             raise self._wrong("E805", message, statement, given, help=help_)
+        # where no unit is declared, the first value with one gives it
         what = "default" if written is statement.value else "argument"
         known = [i.dimension for i in items if i.dimension is not None]
         dimension = unit.dimension if unit is not None else (known[0] if known else NONE)
+        # each value has the dimension of the declaration
         for item in items:
             if item.dimension is not None and item.dimension != dimension:
                 literal = written.operand if isinstance(written, syntax.Negative) else written
@@ -142,6 +153,7 @@ class Parameters(ElaborationContext):
                 help_ = self._with_unit(written, unit) if have == "dimensionless" else None
                 help_ = help_ or self.resolver.missing(item.dimension, dimension, written)
                 code = "E207" if what == "default" else "E214"
+                # an argument: the finding stands at the instance, and names both
                 if code == "E214":
                     name = self.current.path or self.current.component
                     want = unit.text if unit is not None else want
@@ -154,6 +166,7 @@ class Parameters(ElaborationContext):
                 raise self._wrong(code, message, statement, given, help=help_)
         truth = isinstance(value, Typed) and value.truth
         nodes = tuple(i.node for i in items)
+        # a condition is stored as 1 or 0
         if truth:
             nodes = (ex.conditional(nodes[0], ex.const(1.0), ex.const(0.0)),)
         return nodes, unit or self._default_unit(written, dimension), truth
@@ -189,7 +202,7 @@ class Parameters(ElaborationContext):
         if not names:
             return
         own = {n.index.name for n in walk(statement.value) if isinstance(n, syntax.Reduction)}
-        others = {d.name for other, _ in body if not isinstance(other, syntax.Param) for d in declared(other)}
+        others = {d.name for other, _ in body if not isinstance(other, syntax.Param) for d in declarations_of(other)}
         for name in names:
             if name.name in others - own - self.resolver.sight().keys():
                 what = statement.decl.name

@@ -26,6 +26,7 @@ class Statements(Declarations):
     def constraint(self, s: syntax.Constraint) -> None:
         """phi, psi, gamma."""
         place = self.place(s.span)
+        # a psi constrains flows: dx/dt there may be a quasi-velocity
         with self.resolver.virtually() if s.kind == "psi" else nullcontext():
             left, right = self.resolver.scalar(s.left), self.resolver.scalar(s.right)
         dimension = self._sides(f"{s.kind} {s.decl.name}", left, right, s.right, s.left, s.right)
@@ -36,20 +37,23 @@ class Statements(Declarations):
         at = (*family.prefix, *own)
         loops = {ex.index(loop.index) for loop in self.resolver.loops}
         used = {n for a in at for n in ex.topological([a]) if n.op == "index"}
+        # `for i in 1..n { phi link: ... }` would declare one label n times
         if loops - used:
             message = f"'{s.decl.name}' stands in a 'for': its label needs the loop variable"
             raise self.resolver.fail("E106", message, s.decl.span, help=f"{s.decl.name}[i]")
+        # `phi rod: ...` twice; of rod[1], rod[i] the binding compares the elements
         before = self.resolver.constraints.get(family.name, [])
         if before and not at:  # of elements that are given twice the binding knows
             related = (Related("first declared here", before[0].place),)
             self.report.error("E106", f"'{s.decl.name}' is declared twice", self.place(s.decl.span), related=related)
             raise Failed
         node = ex.sub(left.node, right.node)
+        # c*setsign(u) in a gamma is friction with switches of its own
         if s.kind == "gamma":
             node = friction.relation(self, node, ex.const(0.0), family.name, self.resolver.loops, place, si(dimension))
         constraint = Constraint(s.kind, family.name, at, node, self.resolver.loops, si(dimension), place)
-        constraint = events.guarded(self, s, constraint)
-        self.said(constraint)
+        constraint = events.guard_constraint(self, s, constraint)
+        self.add_statement(constraint)
         self.resolver.constraints.setdefault(family.name, []).append(constraint)
 
     def _sides(self, what: str, left: Typed, right: Typed, where: syntax.Expr, *within: syntax.Expr) -> Dimension:
@@ -72,25 +76,28 @@ class Statements(Declarations):
 
     def _energy(self, s: syntax.Energy) -> None:
         node = self._wants(f"energy {s.function}", s.value, dim.ENERGY)
-        self.said(Energy(s.function, node, self.resolver.loops, self.place(s.span)))
+        self.add_statement(Energy(s.function, node, self.resolver.loops, self.place(s.span)))
 
     def _content(self, s: syntax.Content) -> None:
         node = self._wants(f"content {s.function}", s.value, dim.POWER)
         loops, place = self.resolver.loops, self.place(s.span)
         if s.function != "D":
-            self.said(Energy(s.function, node, loops, place))
+            self.add_statement(Energy(s.function, node, loops, place))
             return
         for part, inside in _parts(node, loops):
-            self.said(Energy("D", friction.set_valued(self, part, inside, place), inside, place))
+            self.add_statement(Energy("D", friction.set_valued(self, part, inside, place), inside, place))
 
     def _work(self, s: syntax.Work) -> None:
+        """Add `work F on x`: F delta x is energy (E208); along a quasi-coordinate its part on each displacement."""
         effort = self.resolver.scalar(s.effort)
         quasi = isinstance(s.on, syntax.Call) and s.on.name == "quasi"
+        # `work M on quasi(w)`: on what has a rate and no displacement
         if isinstance(s.on, syntax.Call) and quasi:
             on = self._quasi(s.on)
         else:
             on = self.resolver.scalar(s.on)
             self._is_displacement(on.node, s.on)
+        # N on m; a factor that is missing is named
         if effort.dimension is not None and on.dimension is not None:
             found = multiply(effort.dimension, on.dimension)
             if found != dim.ENERGY:
@@ -101,7 +108,7 @@ class Statements(Declarations):
                 raise self.resolver.fail("E208", message, s.effort.span, help=help_)
         along = self.virtual(on.node, "quasi(w): w", s.on.span) if quasi else ((ex.const(1.0), on.node),)
         for coefficient, node in along:
-            self.said(Work(ex.mul(effort.node, coefficient), node, self.resolver.loops, self.place(s.span)))
+            self.add_statement(Work(ex.mul(effort.node, coefficient), node, self.resolver.loops, self.place(s.span)))
 
     def _quasi(self, on: syntax.Call) -> Typed:
         """The quasi-velocity w of quasi(w), in the dimension of the displacement along it."""
@@ -139,8 +146,12 @@ class Statements(Declarations):
             raise self.resolver.fail("E319", message, where.span, help=help_)
 
     def _dynamic(self, s: syntax.Dynamic) -> None:
+        """Add `dynamic s' = ...`, the rate of a state; E508 where it is not the first derivative of one, or reads other
+        rates.
+        """
         target = s.target.base if isinstance(s.target, syntax.Prime) else s.target
         value = self.resolver.scalar(target)
+        # `dynamic s = ...` or of something that is no state
         if not isinstance(s.target, syntax.Prime) or value.node.op != "var" or value.node.data[1] != "s":
             help_ = "dynamic s' = ..."
             if value.node.op == "var" and value.node.data[1] == "s":
@@ -148,6 +159,7 @@ class Statements(Declarations):
                 help_ = f"dynamic {self.source_text(target.span)}' = ..."
             raise self.resolver.fail("E508", "a dynamic gives the rate of a state", s.target.span, help=help_)
         self.parts.given.add(value.node.data[0])
+        # `dynamic s'' = ...`
         if value.node.data[2]:
             name = value.node.data[0]
             help_ = f"a state for the rate, v = {name}': dynamic {name}' = v, dynamic v' = ...; or coord and energy T*"
@@ -155,6 +167,7 @@ class Statements(Declarations):
             raise self.resolver.fail("E508", said, s.target.span, help=help_)
         rate = dim.quotient(value.dimension or NONE, dim.TIME)
         node = self._wants(f"dynamic {value.node}'", s.value, rate, dynamic=True)
+        # s' = r' would be a system of rates: it is written as a gamma
         for inner in sorted(ex.variables(node), key=lambda n: n.number):
             if inner.op == "var" and inner.data[2]:
                 message = f"dynamic {value.node}' = ... contains {inner}"
@@ -166,12 +179,16 @@ class Statements(Declarations):
         """`init ref = value`, in a model or (override) in a scene."""
         outer = len(self.resolver.loops)
         with ExitStack() as stack:
-            target = self._sliced(s.target, stack)
+            target = self._loop_over_slice(s.target, stack)
             self.in_parts(lambda: self._initial(s, target, override, outer), s.span)
 
     def _initial(self, s: syntax.Init, target_syntax: syntax.Expr, override: bool, outer: int) -> None:
+        """Add an `init` of what a target means, each element with its value; override: by the scene, in place of the
+        model's.
+        """
         with self.resolver.leniently():
             target = self.resolver.scalar(target_syntax)
+        # `init n = 3` of a discrete variable
         if target.node.op == "param" and target.node.data in self.parts.discretes:
             name = target.node.data
             message = f"'{name}' is a discrete variable: it begins with the value of its declaration"
@@ -180,6 +197,7 @@ class Statements(Declarations):
         message = f"'{target.node}' is in {dim.show(target.dimension)} but starts at {{}}"
         dimension = target.dimension or NONE
         given = self.values_at_start(target.node, s.initial.value, dimension, message, outer)
+        # the value is one of parameters and constants: nothing moves yet
         for one, value, loops in given:
             for inner in ex.variables(value):
                 message = f"the initial value of '{one}' depends on '{inner}'"
@@ -188,12 +206,14 @@ class Statements(Declarations):
             begun = Initial(one, value, fixed, loops, self.place(s.span), unit=si(dimension).text)
             self.add_initial(begun, override)
 
-    def _sliced(self, target: syntax.Expr, stack: ExitStack) -> syntax.Expr:
+    def _loop_over_slice(self, target: syntax.Expr, stack: ExitStack) -> syntax.Expr:
         """`x[1..n].f` becomes a loop over x[i].f."""
+        # the range may stand further in: cell[1..n].R.f
         if isinstance(target, syntax.Member):
-            return syntax.Member(self._sliced(target.base, stack), target.name, target.span)
+            return syntax.Member(self._loop_over_slice(target.base, stack), target.name, target.span)
         if isinstance(target, syntax.Prime):
-            return syntax.Prime(self._sliced(target.base, stack), target.span)
+            return syntax.Prime(self._loop_over_slice(target.base, stack), target.span)
+        # one loop for each index that is a range
         if isinstance(target, syntax.Item) and any(isinstance(i, syntax.Range) for i in target.indices):
             at: list[syntax.Index] = []
             for k, index in enumerate(target.indices):
@@ -205,6 +225,7 @@ class Statements(Declarations):
                 else:
                     at.append(index)
             return syntax.Item(target.base, tuple(at), target.span)
+        # a whole array by its name: a loop over each of its dimensions
         if isinstance(target, syntax.Name):
             symbol = self.scope.find(target.name)
             shape = symbol.family.shape if isinstance(symbol, (UnknownSymbol, BranchSymbol)) else ()
@@ -228,14 +249,14 @@ class Statements(Declarations):
         moment = s.moment or "always"
         at = None
         if s.at is not None:
-            at = self.resolver.wanted(s.at, dim.TIME, "E208", "expect at: an instant is wanted, {} found")
+            at = self.resolver.scalar_of(s.at, dim.TIME, "E208", "expect at: an instant is wanted, {} found")
         self.resolver.statics = moment == "static"
         try:
             left, right = self.resolver.scalar(s.left), self.resolver.scalar(s.right)
             what = f"expect {self.source_text(s.left.span)[:40]}"
             dimension = self._sides(what, left, right, s.right, s.left, s.right)
             message = f"expect: within is in {{}}, wants {dim.show(dimension)}"
-            within = None if s.within is None else self.resolver.wanted(s.within, dimension, "E208", message)
+            within = None if s.within is None else self.resolver.scalar_of(s.within, dimension, "E208", message)
         finally:
             self.resolver.statics = False
         for side, node in ((s.left, left.node), (s.right, right.node)) if moment == "static" else ():
@@ -253,7 +274,7 @@ class Statements(Declarations):
 
     def golden(self, s: syntax.Golden) -> None:
         """`expect golden`, in a model or in a scene."""
-        within = self.resolver.wanted(s.within, NONE, "E208", "expect golden: within is a ratio, {} found")
+        within = self.resolver.scalar_of(s.within, NONE, "E208", "expect golden: within is a ratio, {} found")
         self.parts.goldens.append(Golden(s.file, within, self.place(s.span)))
 
 

@@ -15,7 +15,7 @@ from sysdyn.dsl.model.units import NONE
 from sysdyn.dsl.model.values import Values, as_constants
 
 
-def expanded(frame: ElaborationContext, known: Values) -> None:
+def expand_events(frame: ElaborationContext, known: Values) -> None:
     """Events and switches with their observations, an array's element by element."""
     for event in frame.parts.event_drafts:
         for change in _iterations(event.loops, known):
@@ -48,26 +48,30 @@ def _iterations(loops: tuple[Loop, ...], known: Values) -> Iterator[dict[Node, N
 def _switch(frame: ElaborationContext, draft: Draft, change: dict[Node, Node], known: Values) -> Switch:
     """One element of a set-valued law with its watched values."""
 
-    def of(node: Node) -> Node:
+    def in_element(node: Node) -> Node:
         return ex.substitute(node, change)
 
     def seen(node: Node | None) -> str | None:
-        return None if node is None else watch(frame, of(node), NONE, draft.place)
+        return None if node is None else watch(frame, in_element(node), NONE, draft.place)
 
+    # what is compared while it sticks
     bound, upper, lower = (seen(n) for n in _bounds(draft))
-    at = tuple(int(known.number(of(n))) for n in draft.at)
+    at = tuple(int(known.number(in_element(n))) for n in draft.at)
     name = f"{draft.label}[{', '.join(map(str, at))}]" if at else draft.label
     guard = None if draft.guard is None else ex.conditional(draft.guard, ex.const(1.0), ex.const(0.0))
-    value = watch(frame, of(draft.value), draft.unit.dimension, draft.place)
-    rate = watch(frame, of(draft.rate or time_derivative(draft.value)), NONE, draft.place)
-    multiplier = watch(frame, of(draft.multiplier), NONE, draft.place)
-    twice = time_derivative(time_derivative(of(draft.value))) if draft.kind == "phi" else None
+    # the law's own variable, its rate and, of a phi, its acceleration, by which contacts open and close
+    value = watch(frame, in_element(draft.value), draft.unit.dimension, draft.place)
+    rate = watch(frame, in_element(draft.rate or time_derivative(draft.value)), NONE, draft.place)
+    multiplier = watch(frame, in_element(draft.multiplier), NONE, draft.place)
+    twice = time_derivative(time_derivative(in_element(draft.value))) if draft.kind == "phi" else None
     acceleration = None if twice is None else watch(frame, twice, NONE, draft.place)
-    sense = None if draft.sense is None else of(draft.sense)
-    restitution = None if draft.restitution is None else of(draft.restitution)
+    sense = None if draft.sense is None else in_element(draft.sense)
+    restitution = None if draft.restitution is None else in_element(draft.restitution)
     return Switch(
         name, draft.label, at, draft.kind, draft.place, value, rate, multiplier, draft.element,
         acceleration, bound, upper, lower, sense, seen(guard), restitution,
-        tuple(watch(frame, of(n), NONE, draft.place) for n in draft.aim), tuple(of(n) for n in draft.direction),
-        None if draft.holds is None else of(draft.holds), draft.bound is not None and bool(ex.variables(draft.bound)),
+        tuple(watch(frame, in_element(n), NONE, draft.place) for n in draft.aim),
+        tuple(in_element(n) for n in draft.direction),
+        None if draft.holds is None else in_element(draft.holds),
+        draft.bound is not None and bool(ex.variables(draft.bound)),
     )  # fmt: skip
