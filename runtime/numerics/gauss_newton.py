@@ -32,10 +32,12 @@ _FOLDS = 709
 """Iterations that an exponential, falling by e in each, takes from the largest number: as long as rows shrink as fast
 as their terms do none is counted."""
 _HALVINGS, _FLATTEST = 12, 1023
-STRAIGHT = tuning.SAME
+STRAIGHT = 1e-4
 """Of rows at the middle of a way: what they may be off the mean of those at its ends and count as linear along it."""
 _LOST = 3
 """Directions one after the other along which no step makes the rows smaller: the next ones do not either."""
+MISSED = 2
+"""What `graded` answers where rows that are left miss by more than their round-off."""
 _ROUND_OFF = 2e-15
 _ROUNDINGS = 8.0
 """Times the unit round-off of its terms by their slopes: what evaluating a row of several operations may be off by."""
@@ -110,7 +112,7 @@ def _numbered(places: Any, used: Mask) -> Any:
     return number[places]
 
 
-def _graded(a: Floats, aim: Floats, step: Floats, noise: Floats | None = None, doubt: Floats | None = None) -> int:
+def graded(a: Floats, aim: Floats, step: Floats, noise: Floats | None = None, doubt: Floats | None = None) -> int:
     """What core/linear/dense/graded.h answers."""
     failed: int = lib.core.sd_graded(*a.shape, *map(lib.pointer, (a, aim, noise, step, doubt)))
     if failed < 0:
@@ -200,7 +202,7 @@ class _Linear:
         a, columns = self._full()
         step, stands = np.zeros(u.size), np.zeros(u.size, dtype=bool)
         stands[columns] = True
-        if _graded(a, -r / self.row_scale[self.problem.use], step):
+        if graded(a, -r / self.row_scale[self.problem.use], step):
             return None
         return np.where(stands | beside, u + step / self.unit, 0.0)
 
@@ -219,7 +221,7 @@ class _Linear:
         add_sizes(problem.rows, problem.columns, problem.jacobian(x), np.abs(x), noise)
         noise *= _ROUNDINGS * np.finfo(float).eps
         aim = -problem.residual(x)[problem.use]
-        failed = _graded(self._full()[0], aim, step, noise[problem.use], doubt)
+        failed = graded(self._full()[0], aim, step, noise[problem.use], doubt)
         doubt /= _ROUNDINGS
         if failed == 1 or not np.isfinite(step).all():
             return None

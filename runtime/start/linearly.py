@@ -1,8 +1,8 @@
 """Whether a point can exist, where that is linear algebra.
 
 With the state held most models are linear in what follows from it: multipliers, rates, flows and efforts of linear
-laws; circuits of ideal diodes are linear in everything.  Then one least-squares solution says whether their rows can be
-met, and what it leaves of them no search does away with: two diodes that short a source, a gap that is held and closes.
+laws; circuits of ideal diodes are linear in everything.  Then one elimination says whether their rows can be met, and
+what it leaves of them no search does away with: two diodes that short a source, a gap that is held and closes.
 """
 
 from __future__ import annotations
@@ -13,8 +13,8 @@ import numpy as np
 from numpy.typing import NDArray
 from sysdyn.runtime.model import core_library as lib
 from sysdyn.runtime.model.description import Floats, Ints
-from sysdyn.runtime.numerics.equilibrate import factors
-from sysdyn.runtime.numerics.rank import NotFiniteError, least_squares
+from sysdyn.runtime.numerics.gauss_newton import MISSED, graded
+from sysdyn.runtime.numerics.rank import NotFiniteError
 from sysdyn.runtime.start.settled import Settler, columns_of_rates
 from sysdyn.runtime.start.starter import Starter
 from sysdyn.values import dataclass
@@ -25,10 +25,10 @@ ALIKE = 1e-9
 """Of a slope: what it differs by elsewhere and is constant."""
 AROUND = (1.0, -1.0, 1e3, -1e3)
 """Magnitudes from a point where the slopes of a linear row are the same."""
-MISSES, REFINED = 1e-4, 2
-"""Of the terms of a row: what is left of it that is no round-off; solutions, each of what the one before left over."""
-ROUND_OFF = 1e-13
-"""Of the largest singular value: one that is less is no way out; valves in series with a stiff chamber have 2.5e-10."""
+MISSES = 1e-4
+"""Of the terms of a row: what it may miss by as a step of the run leaves it; more, in a sum of rows that eliminates all
+that may move, is no such miss.
+"""
 NOTHING = 1e-6
 """Of its magnitude: what an unknown is of which nothing but round-off may be there."""
 
@@ -76,20 +76,17 @@ class Rows:
         return linear if self._unmet(x, np.where(linear[self.rows], here, 0.0), linear) else None
 
     def _unmet(self, x: Floats, here: Floats, asked: Mask) -> bool:
-        """Whether one least-squares solution leaves one of the rows asked unmet; here: slopes."""
+        """Whether an elimination leaves one of the rows asked unmet, which keeps small coefficients beside large ones
+        (the leak of a blocked bridge beside kiloamperes); here: slopes.  NotFiniteError.
+        """
         free = self.free[self.columns]
-        matrix = np.zeros((asked.size, x.size))
+        matrix, terms = np.zeros((asked.size, x.size)), np.zeros(asked.size)
         np.add.at(matrix, (self.rows[free], self.columns[free]), here[free])
-        matrix[~asked] = 0.0
-        residual = np.where(asked, self.residual(x), 0.0)
-        by_row, by_column = factors(matrix)
-        even, change = by_row[:, None] * matrix * by_column, np.zeros(x.size)
-        for _ in range(REFINED):
-            change += by_column * least_squares(even, -by_row * (matrix @ change + residual), ROUND_OFF)
-        terms = np.abs(matrix) @ np.abs(change)
         np.add.at(terms, self.rows, np.abs(here) * np.maximum(np.abs(x), NOTHING * self.size)[self.columns])
-        left = np.abs(matrix @ change + residual)
-        return bool((left > MISSES * terms)[asked].any())
+        matrix, aim, (step, doubt) = matrix[asked], -self.residual(x)[asked], np.zeros((2, x.size))
+        if not (np.isfinite(matrix).all() and np.isfinite(aim).all()):
+            raise NotFiniteError
+        return graded(matrix, aim, step, MISSES * terms[asked], doubt) == MISSED
 
 
 def unmet(settler: Settler, t: float, y: Floats, yd: Floats, state: Mask) -> bool:

@@ -12,7 +12,7 @@ from sysdyn.runtime.model import core_library as lib
 from sysdyn.runtime.model.description import Floats
 from sysdyn.runtime.model.failures import SolverFailure
 from sysdyn.runtime.start.instant import Instant, UnbalancedError
-from sysdyn.runtime.start.linearly import unmet
+from sysdyn.runtime.start.linearly import contradicting, unmet
 from sysdyn.runtime.start.settled import HELD, Settler
 from sysdyn.runtime.start.starter import Starter
 from sysdyn.runtime.start.strategies import behind
@@ -161,7 +161,8 @@ class Restart:
         idle[starter.n :] = np.isin(starter.rates, starter.system.idle_multipliers())
         guess[idle], state[: y.size] = 0.0, self.state
         for held in (state, np.zeros_like(state))[: 1 + free]:
-            found = behind(starter, t, guess, ~(idle | held))
+            may = ~(idle | held)
+            found = None if contradicting(starter, t, guess, may) is not None else behind(starter, t, guess, may)
             if found is not None:
                 return starter.expand(found)
         return None

@@ -36,7 +36,7 @@ def _stores(folder, seed, formulation):
     names = [f"{name}.e" if kind == "capacitor" else f"{name}.f" for name, kind in kinds]
     file = folder / "m.sd"
     file.write_text(re.sub("trace E[0-9]+.e as v", "trace " + ", ".join(names), Circuit(seed).text))
-    found = simulate(file, output=folder / "a.h5", formulation=formulation, until="1 ns", rtol=1e-4, unmet="warn")
+    found = simulate(file, output=folder / "a.h5", formulation=formulation, until="1 us", rtol=1e-4, unmet="warn")
     return np.array([found[name].values[0] for name in names])
 
 

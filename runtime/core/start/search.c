@@ -19,6 +19,7 @@
 #define FOLDS 709
 #define ROUND_OFF 2e-15
 #define BESIDE 1e-8
+#define STRAIGHT 1e-4
 
 /* The rates yd [extended], and y as blocks read it, in room [extended] behind them: where they are compiled x serves, for they
  * know no audit families. */
@@ -90,7 +91,7 @@ typedef struct {
     double *values, *unit, *row_scale;            /* [entries], [all unknowns], [all rows] */
     double *a, *work, *aim, *size;                /* [rows, unknowns] twice, [all rows] twice */
     double *u, *target, *tried, *stands;          /* [all unknowns] each; stands: 1 where a row has the unknown */
-    double *r, *scaled;                           /* [all rows] */
+    double *r, *scaled, *begun, *end;             /* [all rows] */
 } room;
 
 static int32_t numbers(int32_t count, const int32_t *use, int32_t *at)
@@ -243,6 +244,20 @@ static double tried(sd_search *s, room *w, const double *x, double part)
     return norm;
 }
 
+/* whether rows, at its middle now, are linear along a way on which they do not fall by a tenth: what is nearest to the
+ * solution of linear rows that contradict, or whose slopes magnitudes hide, is all that there is */
+static int ascends(const room *w, int32_t rows)
+{
+    double off = 0.0, size = 0.0, onward = 0.0;
+    for (int32_t r = 0; r < rows; r++) {
+        double bend = w->scaled[r] - 0.5 * (w->begun[r] + w->end[r]);
+        off += bend * bend;
+        size += w->scaled[r] * w->scaled[r];
+        onward += w->begun[r] * (w->end[r] - 0.9 * w->begun[r]);
+    }
+    return sqrt(off) <= STRAIGHT * sqrt(size) && onward > 0.0;
+}
+
 /* whether rows shrink on the first of a way that is too long by powers of ten: that of a law that is flat at x (a junction
  * that blocks, and shall conduct); w->tried: about where they stop to, by bisection of the exponent */
 static int flat(sd_search *s, room *w, const double *x, double norm, double *now)
@@ -273,6 +288,7 @@ static void iterate(sd_search *s, room *w, double *x)
                 s->scaled[r] = fabs(w->scaled[r]);
         }
         stale++;
+        memcpy(w->begun, w->scaled, rows * sizeof *w->begun);
         if (size <= ROUND_OFF || !isfinite(size) || stale > (s->residual < 1e-12 ? 4 : 15))
             break;
         if (s->spent > s->share * fmax(GRANTED, ITERATIONS * s->largest))
@@ -293,6 +309,10 @@ static void iterate(sd_search *s, room *w, double *x)
             now = tried(s, w, x, step);
             if (isfinite(now) && now <= fmax((1.0 - 0.1 * step) * norm, 1e-11))
                 break;
+            if (halvings == 0)
+                memcpy(w->end, w->scaled, rows * sizeof *w->end);
+            if (halvings == 1 && ascends(w, (int32_t)rows))
+                return;
         }
         if (halvings == HALVINGS && !(flat(s, w, x, norm, &now))) {
             lost++;
@@ -322,7 +342,7 @@ int sd_search_solve(sd_search *s)
     w.rows = numbers(m->rows, s->use, w.row_at);
     w.unknowns = numbers(m->unknowns, s->free, w.column_at);
     size_t full = (size_t)w.rows * (size_t)w.unknowns;
-    double *memory = malloc((entries + 6 * all + 5 * rows + 2 * full + 1) * sizeof *memory);
+    double *memory = malloc((entries + 6 * all + 7 * rows + 2 * full + 1) * sizeof *memory);
     if (!memory) {
         free(at);
         return -2;
@@ -340,7 +360,9 @@ int sd_search_solve(sd_search *s)
     w.stands = w.tried + all;
     w.r = w.stands + all;
     w.scaled = w.r + rows;
-    double *x = w.scaled + rows;
+    w.begun = w.scaled + rows;
+    w.end = w.begun + rows;
+    double *x = w.end + rows;
     for (size_t c = 0; c < all; c++)
         w.unit[c] = s->scale[c] / s->weight[c];
     memcpy(x, s->x, all * sizeof *x);

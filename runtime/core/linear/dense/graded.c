@@ -368,7 +368,8 @@ int sd_graded(int32_t m, int32_t n, double *a, double *b, double *noise, double 
             memcpy(missing, noise, (size_t)m * sizeof *missing);
         pivots = eliminate(m, k, first, a, open, b, noise, missing, place);
         failed = !noise && (pivots < k || !(largest(m - k, b + k) <= AGREES * most));
-        left = noise && (missed(m - pivots, b + pivots, noise + pivots) || doubtful(m, k, a, open, pivots));
+        if (noise)
+            left = missed(m - pivots, b + pivots, noise + pivots) ? 2 : doubtful(m, k, a, open, pivots) ? 3 : 0;
     }
     if (!failed) {
         substitute(pivots, k, a, b);
@@ -385,5 +386,5 @@ int sd_graded(int32_t m, int32_t n, double *a, double *b, double *noise, double 
     }
     free(open);
     free(own);
-    return failed ? failed : 2 * left;
+    return failed ? failed : left;
 }

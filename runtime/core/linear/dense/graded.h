@@ -16,7 +16,7 @@
  * of round-off in b, overwritten, of which doubt [n] is what they make of x; columns without a pivot beyond round-off have
  * zero then too, and rows are left.  Columns without a row of their own, the last ones, pivot last: some have none, and
  * infinite doubt.  NULL both: all columns have pivots.  Returns 0; 1: x is not found, for a pivot may be round-off, or rows in
- * excess do not agree with the others; 2: a row that is left misses by more than round-off, or entries of columns that are left
+ * excess do not agree with the others; 2: a row that is left misses by more than round-off; 3: entries of columns that are left
  * may be more; -2: no memory. */
 int sd_graded(int32_t m, int32_t n, double *a, double *b, double *noise, double *x, double *doubt);
 
