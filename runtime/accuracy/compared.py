@@ -40,6 +40,7 @@ class Compared:
         self._opened: tuple[Finished, LeftOpen] | None = None
         self._sized: tuple[Finished, Floats] | None = None
         self._range: Floats = np.zeros(0)  # of quantities whose errors are relative to it
+        self.moves = np.zeros(0, dtype=bool)  # which of these have a range beyond round-off of what they ride on
         self._own: list[Floats] = []
         self.begin()
 
@@ -126,9 +127,16 @@ class Compared:
         with np.errstate(invalid="ignore"):  # of values without bound
             span = (self._ends[1] - self._ends[0])[quantities.places[which]]
         span = np.where(np.isfinite(span), span, sizes[which])
+        self.moves = span > pairs.ROUND_OFF * sizes[which]
         self._range = sizes[which] = np.maximum(span, pairs.ROUND_OFF * sizes[which])
         noise[which] = np.minimum(noise[which], quantities.asked(self.options)[which] * self._range)
         return sizes, noise
+
+    def ranges(self, values: Floats) -> Floats:
+        """What errors of the quantities that are judged by their range are relative to: that, or where it is round-off
+        the largest of their values [those quantities].
+        """
+        return np.where(self.moves, self._range, values)
 
     def _passed_over(self, finished: Finished, quantities: Quantities) -> Floats | None:
         """How far the compared quantities [compared] are from the run before in what one step of that passes over; None

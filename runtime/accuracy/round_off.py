@@ -61,9 +61,14 @@ def blurred(runs: Runs, t: float, asked: Floats) -> tuple[Estimate, ...]:
     y, yd = (x[: system.form.written] for x in finished.last[0]())
     seen = writer.seen()
     size = np.maximum(told.beside(finished.largest, finished.magnitude), [seen[name] for name in told.names])
+    steps = np.ones(size.size)
+    if told.to_range.size:
+        # round-off of x adds up like a random walk in a small difference x - 1e8 m, from step to step
+        steps[told.to_range] = np.sqrt(finished.statistics.steps)
+        size[told.to_range] = runs.compared.ranges(np.array([seen[told.names[k]] for k in told.to_range]))
     wanted = asked[: size.size] * size
     try:
-        left = blur(system, (t, y, yd), told.places, wanted)
+        left = steps * blur(system, (t, y, yd), told.places, wanted)
     except SolverFailure:  # beside the point a function is none
         return ()
     over = np.divide(left, wanted, out=np.zeros(size.size), where=wanted > 0.0)
