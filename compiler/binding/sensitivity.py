@@ -43,7 +43,7 @@ RATES = {
 """Blocks that are first derivatives, and of what."""
 FIRST, LAST = -1, 2
 """Orders of slopes: by the integral of the parameter, by itself, by its first and second rate."""
-_DERIVED = (*RATES, "phi_acceleration")
+_DERIVED = (*RATES, "phi_acceleration", "gamma_acceleration")
 Blocks = dict[str, list[Kernel]]
 
 
@@ -139,6 +139,7 @@ def _by_order(form: DescriptorForm, by: Sequence[dict[str, list[Kernel]]]) -> di
         put(order, "phi_rate", slopes.get("phi_rate", ()), own=True)
         put(order + 1, "phi_acceleration", slopes.get("phi_rate", ()), own=True)
         put(order + 2, "phi_acceleration", slopes.get("phi", ()), own=False)
+        put(order + 2, "gamma_acceleration", slopes.get("gamma", ()))
         # rates of balances follow from the rows whose rates they are
         for name, bases in RATES.items():
             for base in bases:

@@ -26,8 +26,8 @@ BESIDE = (*START, "audit")
 AUDIT = ("energy", "kinetic", "potential", "dissipated", "supplied", "constraints")
 BLOCKS = (
     "dynamics", "dynamics_rate", "phi_reaction", "phi_normal", "psi_reaction", "momentum", "momentum_rate", "phi",
-    "phi_rate", "phi_acceleration", "psi", "psi_rate", "gamma", "gamma_rate", "lambda", "observe", "observe_rate",
-    "observe_scale", "audit", "ledger", "initial",
+    "phi_rate", "phi_acceleration", "psi", "psi_rate", "gamma", "gamma_rate", "gamma_acceleration", "lambda", "observe",
+    "observe_rate", "observe_scale", "audit", "ledger", "initial",
 )  # fmt: skip
 # the blocks that Newton sees: those of steep rows have a block `<name>_scale` (steepness.py)
 SCALED = (
@@ -38,8 +38,8 @@ SCALED = (
 HOME = {
     "dynamics_rate": "dynamics", "phi_reaction": "dynamics", "psi_reaction": "dynamics",
     "momentum_rate": "momentum", "phi_rate": "phi",
-    "phi_acceleration": "phi", "psi_rate": "psi", "gamma_rate": "gamma", "observe_rate": "observe",
-    "observe_scale": "observe",
+    "phi_acceleration": "phi", "psi_rate": "psi", "gamma_rate": "gamma", "gamma_acceleration": "gamma",
+    "observe_rate": "observe", "observe_scale": "observe",
 }  # fmt: skip
 HOME |= {f"{name}_scale": HOME.get(name, name) for name in SCALED}
 # rows without Jacobian entries: Newton never sees them, or only to judge others

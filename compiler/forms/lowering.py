@@ -373,6 +373,14 @@ class _Lowering:
             rate = total_rate(self._in_states(effort.value, f"the balance of {on.data[0]}", None))
             self.assembly.add("dynamics_rate", on.data[0], on.args, effort.nest, rate)
 
+    def _prescribes_motion(self, row: Row) -> bool:
+        """Whether a gamma reads displacements alone, one of what has inertia: b = sin(t) says what the acceleration of b
+        is, and so which effort makes it.
+        """
+        read = {v for term in row.terms for v in variables(term.expression) if v.op == "var"}
+        own = {v.data[0] for v in read if v.data[1] == self.model.mirror.coordinate and not v.data[2]}
+        return row.kind == "gamma" and len(own) == len({v.data for v in read}) and bool(own - self.massless)
+
     def _rates(self, row: Row, nest: Nest, expression: Node) -> None:
         if not self._has_rate(row):
             return
@@ -380,8 +388,8 @@ class _Lowering:
         with moving(()) if integrated else nullcontext():  # its primitive took parameters for constants
             rate = time_derivative(self._in_states(expression, f"{row.kind} {row.name}", row.place))
             self.assembly.add(f"{row.kind}_rate", row.name, row.at, nest, rate)
-            if row.kind == "phi":
-                self.assembly.add("phi_acceleration", row.name, row.at, nest, time_derivative(rate))
+            if row.kind == "phi" or self._prescribes_motion(row):
+                self.assembly.add(f"{row.kind}_acceleration", row.name, row.at, nest, time_derivative(rate))
 
 
 def _by_name(rows: Iterable[Row]) -> dict[str, list[Row]]:

@@ -11,7 +11,13 @@ from sysdyn.runtime.model.system import System
 from sysdyn.runtime.numerics.matching import matched
 from sysdyn.runtime.numerics.points import distinct
 
-RATE_OF = {"phi_acceleration": "phi_rate", "psi_rate": "psi", "gamma_rate": "gamma", "momentum_rate": "momentum"}
+RATE_OF = {
+    "phi_acceleration": "phi_rate",
+    "psi_rate": "psi",
+    "gamma_rate": "gamma",
+    "gamma_acceleration": "gamma_rate",
+    "momentum_rate": "momentum",
+}
 """Group of rows -> group of which they are the time derivative."""
 
 

@@ -41,6 +41,7 @@ BASE = {
     "phi_acceleration": "phi",
     "psi_rate": "psi",
     "gamma_rate": "gamma",
+    "gamma_acceleration": "gamma",
     "observe_rate": "observe",
     "observe_scale": "observe",
 }

@@ -71,11 +71,14 @@ FORMS: dict[str, tuple[tuple[str, str], ...]] = {
         ("psi_rate", "psi_rate"),
         ("gamma", "gamma"),
         ("gamma_rate", "gamma_rate"),
+        ("gamma_acceleration", "gamma_acceleration"),
         ("lambda", "lambda"),
     ),
 }
 FORMS["valued"] = tuple(
-    call for call in FORMS["settled"] if call[1] not in ("momentum_rate", "phi_acceleration", "psi_rate", "gamma_rate")
+    call
+    for call in FORMS["settled"]
+    if call[1] not in ("momentum_rate", "phi_acceleration", "psi_rate", "gamma_rate", "gamma_acceleration")
 )
 FORMS["rated"] = (*FORMS["settled"], ("dynamics_rate", "dynamics_rate"))
 FORMS["start"] = (*FORMS["rated"], ("initial", "initial"))

@@ -19,7 +19,15 @@ from sysdyn.runtime.model.system import LARGE, System
 from sysdyn.runtime.start.settled import columns_of_rates, inertial_rates, rates_of
 
 Mask = NDArray[np.bool_]
-HIDDEN = ("dynamics_rate", "momentum_rate", "phi_rate", "phi_acceleration", "psi_rate", "gamma_rate")
+HIDDEN = (
+    "dynamics_rate",
+    "momentum_rate",
+    "phi_rate",
+    "phi_acceleration",
+    "psi_rate",
+    "gamma_rate",
+    "gamma_acceleration",
+)
 """Groups of rows that are derivatives of others."""
 
 

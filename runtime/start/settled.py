@@ -34,7 +34,7 @@ LARGE = 100_000
 """The same from which a state is held within a basis."""
 FREE = 1e-4
 """Weight (of squares: its square) of unknowns that follow from the state."""
-RATES = ("momentum_rate", "gamma_rate", "dynamics_rate")
+RATES = ("momentum_rate", "gamma_rate", "gamma_acceleration", "dynamics_rate")
 DIFFERS = 2
 """SD_DIFFERS (core/system/settle.h): an unknown whose differences from others are of the state."""
 LEFT_OUT = 3

@@ -134,7 +134,10 @@ def _begun(starter: Starter, t: float, guess: Floats, free: Mask) -> Floats:
     x, held = _onto(starter, t, guess, guess, rows=starter.told, free=own), starter.moves("e") & starter.written
     if not held.any():
         return x
-    rows, may = starter.every & ~starter.groups("gamma", "gamma_rate"), free & ~held & starter.following(t, x)
+    rows, may = (
+        starter.every & ~starter.groups("gamma", "gamma_rate", "gamma_acceleration"),
+        free & ~held & starter.following(t, x),
+    )
     return starter.without_noise(_onto(starter, t, x, guess, rows=rows, free=may), starter.scale(t, x))
 
 

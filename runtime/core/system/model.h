@@ -22,7 +22,8 @@
  *   momentum_rate     its total time derivative
  *   phi, phi_rate, phi_acceleration    Phi;  Phi_q f + Phi_t;  Phi_q f' + Z1
  *   psi, psi_rate     Psi;  Psi_f f' + Z2
- *   gamma, gamma_rate Gamma and its total time derivative (reads yd of f, s, e)
+ *   gamma, gamma_rate Gamma and its total time derivative (reads yd of f, s, e); gamma_acceleration: the second one, where it
+ *                     reads displacements alone
  *   lambda            s' - Lambda
  *   observe           one row family a traced quantity (and each side of an expect); reads y, yd and the audit
  *   observe_rate      their time derivatives, where known
