@@ -81,6 +81,7 @@ def answer_to_json(answer: Answer, kinds: Sequence[str]) -> dict[str, Any]:
     """The object of --json."""
     f, m = answer.frequencies, answer.margins
     found: dict[str, Any] = {"output": answer.output, "input": answer.input}
+    # margins are read off the frequency response, bode or nyquist
     if "bode" in kinds or "nyquist" in kinds:
         found["margins"] = {"gain": m.gain, "w_phase": m.w_phase, "phase": m.phase, "w_gain": m.w_gain}
     if "bode" in kinds:
@@ -95,6 +96,7 @@ def answer_to_json(answer: Answer, kinds: Sequence[str]) -> dict[str, Any]:
 def answer_to_text(answer: Answer, kinds: Sequence[str]) -> str:
     """Tables of a few rows each."""
     f, parts = answer.frequencies, [answer.label]
+    # a few rows spread over the frequencies; --json has all
     places = np.unique(np.linspace(0, f.w.size - 1, ROWS).round().astype(int))
     if "bode" in kinds:
         rows = [[f"{f.w[k]:.5g}", f"{f.magnitude[k]:.5g}", f"{f.phase[k]:.5g}"] for k in places]

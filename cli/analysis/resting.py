@@ -64,6 +64,7 @@ class Equilibrium:
     def to_text(self, number: int) -> str:
         """A few lines for the terminal."""
         lines = [f"{number}  {self._judgement()}"]
+        # q, s and e, and flows that are not zero
         shown = [
             f"{name} = {value + 0.0:.9g}{'' if unit == '1' else f' {unit}'}"
             for (name, value), kind, unit in zip(self.values.items(), self.kinds, self.units, strict=True)
@@ -78,6 +79,7 @@ class Equilibrium:
             lines.append(f"   {', '.join(f'{name} {how}' for name, how in list(self.rest.holding.items())[:MOST])}")
         if self.rest.free:
             lines.append(f"   one of a continuum; left open: {', '.join(self.rest.free[:6])}")
+        # slowest decay, or fastest growth, first
         if self.judged is not None and self.judged.modes:
             modes = sorted(self.judged.modes, key=lambda m: -m.eigenvalue.real)[:6]
             rest = [f"... {len(self.judged.modes) - 6} more"] if len(self.judged.modes) > 6 else []

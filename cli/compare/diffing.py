@@ -93,13 +93,16 @@ def sentence(c: Compared) -> str:
     """What is wrong with one quantity."""
     w = c.worst
     match c.status:
+        # beyond the tube
         case "differs":
             unit = "" if c.unit == "1" else f" {c.unit}"
             values = f"{w.test:.9g}{unit}, reference {w.reference:.9g}{unit}, limit {c.limit:.3g}{unit}"
             return f"{c.name}{_time_text(c)} is {_times(w.ratio)} over the limit: {values}" + (c.note and f"; {c.note}")
+        # another span, or other events
         case "coverage" | "events":
             over = f", {_times(w.ratio)} over the limit" if math.isfinite(w.ratio) else ""
             return f"{c.name}: {c.note}{over}"
+        # one has it and the other does not; another unit; not finite
         case _:
             words = {"unit": "is of another unit", "nonfinite": "cannot be within a limit"}
             word = words.get(c.status, f"is {c.status}")

@@ -136,6 +136,7 @@ class Writer(ABC):
         match node.op:
             case "const":
                 return self.number(node.data)
+            # leaves
             case "param":
                 return self.symbol(self.letters.name(node.data), texts), ATOM
             case "index":
@@ -144,6 +145,7 @@ class Writer(ABC):
                 return "t", ATOM
             case "var":
                 return self.symbol(self.letters.letter_of(node), texts), ATOM
+            # operations
             case "sum":
                 return self._sum(node, args)
             case "mul":
@@ -205,6 +207,7 @@ class Writer(ABC):
         """Factor times what stands above, by what stands below."""
         if factor != 1.0:
             whole = factor * 12.0
+            # 0.5 x / m reads x / (2 m), as 1/3 and 1/12 do; 0.3 x stays
             if below and factor < 10 and whole == int(whole) and factor != int(factor):
                 over = next(k for k in (2, 3, 4, 6, 12) if factor * k == int(factor * k))
                 below = [str(over), *below]
@@ -212,6 +215,7 @@ class Writer(ABC):
             else:
                 above = [self.number(factor)[0], *above]
         top = self.product(above) if above else "1"
+        # no fraction: a product, or the factor alone
         if not below:
             return top, PRODUCT if len(above) > 1 else ATOM if factor == 1.0 else PRODUCT
         under = self.product(below)
@@ -232,10 +236,12 @@ class Writer(ABC):
                 return f" {node.op} ".join(self._hold(a, PRODUCT) for a in args), SUM
             case "not":
                 return f"not {self._hold(args[0], ATOM)}", SUM
+            # a sum, product, least or largest over a counter
             case "reduce":
                 operator, name = node.data
                 loop = Loop(name, node.args[0], node.args[1])
                 return self.total(operator, loop, self._hold(args[2], PRODUCT)), PRODUCT
+            # K'(x), K''(x); of several arguments K(1, 0)(x, y)
             case "table":
                 label, orders = node.data
                 primes = "'" * orders if isinstance(orders, int) else f"({', '.join(map(str, orders))})"

@@ -47,6 +47,7 @@ def _changes(formed: Formed, places: dict[str, slice], following: Following, nam
     """Whether the index at the start is another one, or none, where a parameter is zero."""
     prepared, written = formed.prepared, formed.written
     arrays = dict(prepared.arrays)
+    # other parameters are formulas of it: all are bound anew
     if any(name in used for used in following.follows.values()):
         try:
             arrays = prepared.arrays_of(prepared.compiled.bind({name: 0.0}))
@@ -59,6 +60,7 @@ def _changes(formed: Formed, places: dict[str, slice], following: Following, nam
     if written.left_out:
         other = other.without(written.left_out)
     jy, jyd = other.jacobian(formed.state.t, *formed.state.for_form(other))
+    # 1/p: no number at zero
     if not (np.isfinite(jy).all() and np.isfinite(jyd).all()):
         return True
     return index_of(other, formed.state)[0] != formed.facts.index

@@ -71,6 +71,7 @@ def page(cases: Sequence[Case]) -> str:
         parts.append(_summary([(f'<a href="#case{k}">{escape(_title(c))}</a>', c) for k, c in enumerate(wrong)]))
     for k, case in enumerate(wrong):
         parts.append(f'<h2 id="case{k}">{escape(_title(case))}</h2>')
+        # findings that the case's own page of quantities does not have
         beside = [t for name, t in case.cases if t is not None and name.partition(":")[0] in BESIDE]
         if beside:
             parts.append('<ul class="bad">' + "".join(f"<li>{escape(text)}</li>" for text in beside) + "</ul>")

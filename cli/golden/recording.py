@@ -193,9 +193,11 @@ def _error(verdict: Verdict, rtol: float, method: str) -> float:
     if worst is None:
         return 0.0
     unlike = [c for c in verdict.traces if not c.equal]
+    # missing quantities or other events: no error can be told
     if unlike or any(c.status not in ("equal", "differs") for c in verdict.quantities):
         raise Refused(f"two runs of the scene do not agree ({method}): {sentence(worst)}")
     error = max(c.worst.ratio for c in verdict.quantities) * rtol / MARGIN
+    # a tolerance of less than MARGIN times the reference's own error
     if MARGIN * error > rtol:
         message = f"the reference itself is off by {error:.1e} ({worst.name} at {worst.worst.time:.6g} s, {method})"
         help_ = f"--rtol {2 * MARGIN * error:.0e}" if error < 0.05 else "a shorter scene: it is chaotic or too stiff"

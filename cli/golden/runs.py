@@ -107,13 +107,16 @@ def _ran(request: Request, report: Report, also: Floats | None) -> Ran | None:
     options = None if prepared is None else options_of(own, target, prepared, report, time.monotonic(), None)
     if prepared is None or options is None:
         return None
+    # the finest of what is asked for, of the text's, of single quantities
     if request.accuracy is not None:
         finest = min([request.accuracy, options.accuracy or 1.0, *(a for _, a in options.accuracy_on)])
         options = replace(options, accuracy=finest, accuracy_on=())
     even = np.linspace(options.t_start, options.t_end, INSTANTS + 1)
     wanted = even if also is None else np.union1d(even, also)
+    # instants so near that they are one
     wanted = wanted[np.diff(wanted, prepend=-np.inf) > APART * (options.t_end - options.t_start)]
     inside = wanted[(wanted >= options.t_start) & (wanted <= options.t_end)]
+    # the steps themselves and these instants, in place of the scene's
     options = replace(options, output=None, every=None, at=tuple(inside.tolist()))
     return integrate(target, prepared, options, report)
 

@@ -60,12 +60,14 @@ class Checker:
         if not self._waiting:
             return None
         now = time.monotonic()
+        # one check at a time; it has PATIENCE if its own text is newer by now, LONGEST otherwise
         if self._busy is not None:
             left = self._busy[1] + (PATIENCE if self._busy[0] in self._waiting else LONGEST) - now
             if left > 0.0:
                 return left
             self.end()
         name, due = min(self._waiting.items(), key=lambda item: item[1])
+        # its text changed a moment ago: more of it may come
         if due > now:
             return due - now
         del self._waiting[name]

@@ -146,6 +146,7 @@ def definition(document: Document, offset: int) -> list[dict[str, Any]]:
     if word is None:
         return []
     item = sight.item_at(document, offset)
+    # on the name of a module: the file
     if isinstance(item, syntax.Import) and item.module.span.start <= offset <= item.module.span.end:
         module = sight.module_of(document.source, item.module.names)
         return [] if module is None else [positions.location(Place(module.source, Span(0, 0)))]

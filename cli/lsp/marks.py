@@ -57,11 +57,14 @@ def _names(node: object, text: str) -> Iterator[int]:
     match node:
         case syntax.Name() | syntax.Word() | syntax.Decl() | syntax.Call() | syntax.Parameter():
             yield node.span.start
+        # x.power: the last word
         case syntax.Member():
             yield node.span.end - len(node.name)
+        # x.derivative(...): the word behind the dot
         case syntax.Method():
             found = _DOTS.search(text, node.base.span.end)
             yield node.span.start if found is None else found.start()
+        # std.thermal: each word
         case syntax.Dotted():
             yield from (m.start() for m in _DOTS.finditer(text, node.span.start, node.span.end))
         case syntax.Arg(name=str()):

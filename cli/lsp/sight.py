@@ -200,10 +200,12 @@ def instance_at(document: Document, offset: int) -> syntax.Instance | None:
 
 def members(document: Document, path: tuple[str, ...], offset: int) -> list[Declared]:
     """What is declared inside the component that a path of names leads to; nothing behind elements of the language."""
+    # std.thermal.
     if path[0] == "std":
         module = module_of(document.source, path)
         return [] if module is None else [*outline.items(module)]
     tree, among = document.tree, [*local(document, offset), *of_file(document.tree)]
+    # house.wall.: an instance, its component's body, and so on
     for name in path[:_DEEPEST]:
         owner = next((d for d in among if d.name == name), None)
         if owner is None:
@@ -246,10 +248,12 @@ def owner_of(document: Document, path: tuple[str, ...], offset: int) -> Declared
 
 def letters(document: Document, owner: Declared) -> tuple[str, ...]:
     """The members that the language itself gives to what has power: e, f, q, p, ..."""
+    # e1, f1, q1, p1, e2, ...
     if owner.of in TWO_PORTS:
         return tuple(f"{letter}{k}" for k in (1, 2) for letter in "efqp")
     if owner.kind in ("element", "branch") or owner.of in ONE_PORTS:
         return (*OWN, "power", "energy")
+    # a component of one branch stands for it: spring.e
     if owner.kind == "instance" and (component := component_of(document.tree, owner)) is not None:
         single = any(isinstance(s, syntax.Branch) and not s.decls for s in component.body)
         return (*OWN, "power", "energy") if single else ()

@@ -86,6 +86,7 @@ def find(name: str) -> Entry | None:
 
 def page(entry: Entry) -> str:
     """What a user of the library needs of one entry: ports, parameters, text, an example."""
+    # a domain, a bundle, a constant: its text is all
     if not isinstance(entry.item, syntax.Component):
         return f"{entry.name}: {entry.line}\nIn every file, without an import.\n\n{_indent(entry.text)}"
     body = tuple(_statements(entry.item.body))
@@ -215,11 +216,13 @@ def example(entry: Entry) -> str | None:
     if entry.kind != "component":
         return None
     source, items = _examples(entry.module)
+    # `Wall_example`, a model, and `Wall_run`, its scene
     chosen = [items[name] for name in (f"{entry.name}_example", f"{entry.name}_run") if name in items]
     if not chosen:
         return None
     model = chosen[0]
     assert isinstance(model, syntax.Model)
+    # the imports that the example's instances need
     used = {s.component.names[0] for s in model.body if isinstance(s, syntax.Instance)}
     wanted: dict[str, list[str]] = {}
     for e in entries():

@@ -58,11 +58,13 @@ def _values(parameter: Parameter, known: Values) -> float | list[float] | None:
         return None
     if not parameter.shape:
         return _in_unit(known.number(parameter.values[0]), parameter)
+    # a matrix has no list here
     if len(parameter.shape) > 1:
         return None
     first, last = (known.number(n) for n in parameter.shape[0])
     if not (math.isfinite(first) and math.isfinite(last)):
         return None
+    # one more than are shown, so that the reader sees there are more
     indices = range(int(first), min(int(last), int(first) + _FIRST) + 1)
     return [_in_unit(known.element(parameter.name, i), parameter) for i in indices]
 

@@ -100,6 +100,7 @@ def _library() -> str:
 def _entry(entry: library.Entry) -> str:
     """HTML of a library's entry: picture, parameters, text and example."""
     parts = [f'<h4 id="{_anchor(entry)}"><code>{escape(entry.name)}</code></h4><p>{escape(entry.doc)}</p>']
+    # domains, bundles and constants have a text alone
     if isinstance(entry.item, syntax.Component):
         parts.append(f"<pre>{escape(library.picture(entry))}</pre>")
         rows = [[p["name"], p["unit"], p["default"] or "required", p["doc"]] for p in library.parameters(entry.item)]

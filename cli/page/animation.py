@@ -171,6 +171,7 @@ def _place(it: Film, point: tuple[str, str], unit: str) -> tuple[Floats, Floats]
     """Both coordinates of a point in a unit, frame by frame; UsageError where one is of another dimension."""
     found = []
     for text in point:
+        # a number in place of a quantity: a fixed point
         if text not in it.trace.names:
             found.append(np.full_like(it.instants, float(text)))
             continue

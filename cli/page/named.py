@@ -26,6 +26,7 @@ def destination(trace: str, output: str | None, console: Console, kinds: tuple[s
 
     kinds: ends of names, with the dot; what: this command makes, as a message says.
     """
+    # standard output has no end of a name: the first kind
     if output == "-":
         if console.as_json:
             raise UsageError("-o - and --json both want standard output")

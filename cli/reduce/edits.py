@@ -128,6 +128,7 @@ def merge_nodes(target: Target, text: str, candidate: Candidate) -> str | None:
     ends = _ends(text, statement.connections[0])
     if len(ends) != 2 or not all(re.fullmatch(r"\w+", end) for end in ends):
         return None
+    # the second end goes, or the first where the model speaks of the second elsewhere
     for stays, goes in (ends, ends[::-1]):
         node = _node_statement(target, goes)
         if node is not None and stays != goes and _spoken(target, text, goes) == 0:

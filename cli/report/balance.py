@@ -229,10 +229,12 @@ def section(found: Sequence[Share] | None, link: Sequence[str], balance: float) 
         why = "there is no power in it, or its run failed or took long"
         return f'<p class="soft">The energies of the elements were not measured: {why}.</p>'
     rows = []
+    # a share stands in the column of its role
     for share, label in zip(found, link, strict=True):
         rows.append([label, *(joules(share.energy) if share.role == c else "" for c in WORDS)])
     sums = {c: sum(s.energy for s in found if s.role == c) for c in WORDS}
     rest = sums["held"] + sums["out"] - sums["in"]
+    # what no element accounts for, beyond the errors of integration
     if abs(rest) > max(REST * max(abs(s.energy) for s in found), 10.0 * abs(balance)):
         rows.append(["constraints and statements that move in time", "", "", joules(rest), ""])
         sums["in"] += rest

@@ -35,6 +35,7 @@ def collect(request: Request, report: Report, progress: Progress | None = None) 
     began = time.monotonic()
     with _time_stage("read", stages):
         target = targets.target_of(request, report)
+    # the report has it
     if target is None:
         return None
     with _time_stage("check", stages):
@@ -44,6 +45,7 @@ def collect(request: Request, report: Report, progress: Progress | None = None) 
         report.extend(inner if network else targets.refuse_unsupported(inner))
     if network is None:
         return None
+    # from here on the run's own stages
     prepared = _prepare(request, network, report, stages)
     if prepared is None:
         return None

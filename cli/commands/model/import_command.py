@@ -25,6 +25,7 @@ def command(console: Console, file: str, output: str | None) -> int:
     .subckt, .global, .ic, .temp, .options, and .include of its own folder. What cannot be said is an error with its
     line; what a model has beyond it a warning.
     """
+    # `-o -` is standard output, which is the default
     output = None if output == "-" else output
     if output is not None and not output.endswith(".sd"):
         raise UsageError(f"-o {output}: a model's text ends in .sd")
@@ -35,6 +36,7 @@ def command(console: Console, file: str, output: str | None) -> int:
         return console.finish(1)
     text = format_fast(text)
     console.result = {"text": text, "output": output}
+    # the text itself; else a file, and a line that says so
     if output is None:
         console.data(text, verbatim=True)
     else:

@@ -88,6 +88,7 @@ def _summary(found: Reduced, target: Path, *, kept: bool, timings: bool) -> str:
     """A table of the trials, and what the reduction came to."""
     rows = [["change", "", "share", "error", ""]]
     for t in found.trials:
+        # - where no run was made
         error = "-" if t.error is None else f"{t.error:.1e}"
         reason = t.reason if len(t.reason) <= 70 else t.reason[:67] + "..."
         rows.append([t.label, t.how, f"{100.0 * t.share:.3f} %", error, "kept" if t.kept else reason])
@@ -95,6 +96,7 @@ def _summary(found: Reduced, target: Path, *, kept: bool, timings: bool) -> str:
     if not found.ended:
         lines.append("the budget of wall time is spent: elements that were not tried may go too")
     number = sum(t.kept for t in found.trials)
+    # nothing could go: no target was written
     if not kept:
         return "\n".join([*lines, f"{found.name}: every element that was tried is needed for {found.accuracy:.0e}"])
     gone = "1 element is" if number == 1 else f"{number} elements are"

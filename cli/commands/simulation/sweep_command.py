@@ -113,6 +113,7 @@ def _show_results(console: Console, found: Swept, plot: str | None) -> int:
     console.say(f"{found.output}: {len(found.cases)} runs{resumed}")
     if found.alone and len(found.cases) > SHOWN:
         console.say(f"one by one: {found.alone}")
+    # the first failures with their reasons, then how many more
     for kept in found.failed[:SHOWN]:
         console.complain(f"run {kept.run} ({_settings_text(found, kept.run)}): {kept.reason}", kept.exit, kept.finding)
     if len(found.failed) > SHOWN:

@@ -118,9 +118,11 @@ def _report_faults(found: Traded, console: Console, use: str) -> int:
     """Says what is wrong; the exit code."""
     if not found.ended:
         console.say("the budget of wall time is spent: settings that were not tried may be cheaper; ask again to go on")
+    # a chaotic model: beyond some instant no error can be told
     if found.reference.until < found.span[1]:
         text = f"errors count up to {found.reference.until:g} s of {found.span[1]:g} s: beyond, the finest runs differ"
         console.say(text)
+    # a combination reaches the accuracy: how to use it
     if use:
         console.results(use, verbatim=True)
         return 0

@@ -238,13 +238,16 @@ def _verdict(found: Verified) -> str:
     """One line: how many runs agree, or that they do not."""
     ended = [run for run in found.runs if not run.failure]
     number = len(ended)
+    # runs that are met and differ, or twins that do
     if found.apart or any(not d.doubted for d in found.disagreements) or not all(t.agree for t in found.twins):
         return f"{number} runs: they disagree"
+    # only runs that have not reached their accuracy differ
     if found.disagreements:
         return f"{number} runs, of which some are not met: the others agree"
     if len(ended) == len(found.runs):
         return f"{number} runs agree on {len(found.compared)} quantities"
     stopped = f"{len(found.runs) - number} of {len(found.runs)} runs stopped early"
+    # one run agrees with nothing
     if number < 2:
         return f"{stopped}: nothing is known from them"
     return f"{stopped}: the other {number} agree on {len(found.compared)} quantities"

@@ -47,6 +47,7 @@ class InCore:
         self, request: Request, target: Target, prepared: Prepared, nominal: Callable[[], Ran | None], keep: int
     ) -> None:
         """nominal: a run with the text's own numbers."""
+        # what the core cannot do by itself: runs go one by one then
         if prepared.backend != "c":
             raise NotApplicableError("the model is not compiled to C")
         if prepared.network.events or prepared.network.switches:
@@ -55,6 +56,7 @@ class InCore:
         if keep == ROWS:
             self._as_ever()
         self.options = self._options(request, target)
+        # options that need Python between steps
         why = obstacle(self.options)
         if why is not None:
             raise NotApplicableError(why)

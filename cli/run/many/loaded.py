@@ -125,11 +125,13 @@ def place_of(name: str) -> str | tuple[str | int, ...]:
 def text_of(value: Any) -> str:
     """A value as --set takes it; UsageError where it is neither a number that is a double, nor some, nor a text."""
     try:
+        # a lone surrogate is no text
         if isinstance(value, str):
             value.encode()
             return value
         if np.iscomplexobj(value):
             raise TypeError
+        # a list or an array
         if np.ndim(value):
             return f"[{', '.join(repr(float(v)) for v in value)}]"
         return repr(float(value))
