@@ -16,10 +16,10 @@ from sysdyn.compiler.binding import again as again_
 from sysdyn.compiler.binding import binding as binding_
 from sysdyn.compiler.binding import columns as columns_
 from sysdyn.compiler.binding import manifest
-from sysdyn.compiler.binding.again import Way
+from sysdyn.compiler.binding.again import Consequences
 from sysdyn.compiler.binding.binding import Binding, Overrides
 from sysdyn.compiler.binding.checks import check_energies
-from sysdyn.compiler.binding.columns import Columns, Floats
+from sysdyn.compiler.binding.columns import Floats, ParameterColumns
 from sysdyn.compiler.binding.counts import check_counts
 from sysdyn.compiler.forms import descriptor
 from sysdyn.compiler.forms.conjugates import with_book_signs
@@ -119,11 +119,11 @@ class CompiledModel:
             raise ModelError(found)
         return binding
 
-    def way(self, binding: Binding, names: frozenset[str]) -> Way | None:
+    def way(self, binding: Binding, names: frozenset[str]) -> Consequences | None:
         """What follows from scalar parameters; None where more than numbers does."""
         return again_.way(self.network, self.energies, self.form, self.program, binding, names)
 
-    def columns(self, binding: Binding, varied: Mapping[str, Floats]) -> Columns | None:
+    def columns(self, binding: Binding, varied: Mapping[str, Floats]) -> ParameterColumns | None:
         """Bindings of many runs at once; None where each needs its own."""
         return columns_.columns(self.network, self.energies, self.form, self.program, binding, varied)
 

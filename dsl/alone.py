@@ -13,7 +13,7 @@ from collections.abc import Collection, Iterable, Iterator, Sequence
 from dataclasses import replace
 
 from sysdyn.dsl.elaborate.parts import declarations_of
-from sysdyn.dsl.load import Document, network
+from sysdyn.dsl.load import ParsedFile, network
 from sysdyn.dsl.model import budget
 from sysdyn.dsl.model.expression import fresh
 from sysdyn.dsl.text.diagnostics import Diagnostic, Place, Report
@@ -23,19 +23,19 @@ from sysdyn.dsl.tree.walking import children
 
 _ITS_USERS = {"E409", "E411", "E412", "E413", "W705", "E322", "E805", "E807"}
 """What is said of a network, whose other part is missing here, and of numbers, which a user gives."""
-_Port = syntax.Port | syntax.Branch | syntax.Input
+_Port = syntax.PortStatement | syntax.BranchStatement | syntax.InputStatement
 _SIZE = 3
 """Of arrays whose size a user gives."""
 
 
-def unused_components(file: syntax.File) -> list[syntax.Component]:
+def unused_components(file: syntax.File) -> list[syntax.ComponentDefinition]:
     """The components of a file that no model in it has inside, whichever level is chosen."""
-    components = {item.name.name: item for item in file.items if isinstance(item, syntax.Component)}
-    used, stack = set[str](), [item for item in file.items if isinstance(item, syntax.Model)]
+    components = {item.name.name: item for item in file.items if isinstance(item, syntax.ComponentDefinition)}
+    used, stack = set[str](), [item for item in file.items if isinstance(item, syntax.ModelDefinition)]
     found: list[object] = list(stack)
     while found:
         node = found.pop()
-        if isinstance(node, syntax.Instance):
+        if isinstance(node, syntax.InstanceStatement):
             name = node.component.names[0]
             if name in components and name not in used:
                 used.add(name)
@@ -44,7 +44,7 @@ def unused_components(file: syntax.File) -> list[syntax.Component]:
     return [component for name, component in components.items() if name not in used]
 
 
-def check_unused_components(document: Document) -> Iterator[tuple[str, Report]]:
+def check_unused_components(document: ParsedFile) -> Iterator[tuple[str, Report]]:
     """Of each such component of a file: its name, and what is wrong with it and with what stands outside of all models
     and components.
     """
@@ -61,9 +61,13 @@ def check_unused_components(document: Document) -> Iterator[tuple[str, Report]]:
                 return
 
 
-def _check_component(document: Document, component: syntax.Component) -> Report:
+def _check_component(document: ParsedFile, component: syntax.ComponentDefinition) -> Report:
     report, source = Report(), document.file.source
-    whole = [i for i in document.file.items if isinstance(i, (syntax.Component, syntax.Model, syntax.Scene))]
+    whole = [
+        i
+        for i in document.file.items
+        if isinstance(i, (syntax.ComponentDefinition, syntax.ModelDefinition, syntax.SceneDefinition))
+    ]
     others = [item.span for item in whole if item is not component]
     for model in _models(component):
         inner = Report()
@@ -79,29 +83,31 @@ def _own(finding: Diagnostic, others: Iterable[Span]) -> bool:
     return not any(span.start <= finding.place.span.start < span.end for span in others)
 
 
-def _models(component: syntax.Component) -> Iterator[syntax.Model]:
+def _models(component: syntax.ComponentDefinition) -> Iterator[syntax.ModelDefinition]:
     """One for each level of a component."""
-    levels = [s for s in component.body if isinstance(s, syntax.Level)]
-    base = tuple(s for s in component.body if not isinstance(s, syntax.Level))
+    levels = [s for s in component.body if isinstance(s, syntax.LevelStatement)]
+    base = tuple(s for s in component.body if not isinstance(s, syntax.LevelStatement))
     if not levels:
         yield _model(component, base, ())
     for level in levels:
         yield _model(component, [*base, *_inside(level, levels)], (level.name.name,))
 
 
-def _inside(level: syntax.Level, levels: Iterable[syntax.Level]) -> Iterator[syntax.Statement]:
+def _inside(level: syntax.LevelStatement, levels: Iterable[syntax.LevelStatement]) -> Iterator[syntax.Statement]:
     """The statements of a level and of those that it extends."""
     known, seen = {one.name.name: one for one in levels}, set[str]()
-    at: syntax.Level | None = level
+    at: syntax.LevelStatement | None = level
     while at is not None and at.name.name not in seen:
         yield from at.body
         seen.add(at.name.name)
         at = known.get(at.extends.name) if at.extends else None
 
 
-def _model(component: syntax.Component, said: Sequence[syntax.Statement], level: tuple[str, ...]) -> syntax.Model:
+def _model(
+    component: syntax.ComponentDefinition, said: Sequence[syntax.Statement], level: tuple[str, ...]
+) -> syntax.ModelDefinition:
     """A model of one instance of a component."""
-    ports = [s for s in said if isinstance(s, (syntax.Port, syntax.Branch, syntax.Input))]
+    ports = [s for s in said if isinstance(s, (syntax.PortStatement, syntax.BranchStatement, syntax.InputStatement))]
     sizes = {n.name for s in said for n in _below(bound for d in declarations_of(s) for bound in d.indices)}
     if any(d.indices for s in ports for d in declarations_of(s)):  # of a size that the component says
         around, args = _parameters(said, sizes, every=True)
@@ -116,15 +122,17 @@ def _model(component: syntax.Component, said: Sequence[syntax.Statement], level:
     while label in taken:
         label += "_"
     kind = syntax.Dotted((component.name.name, *level), component.name.span)
-    instance = syntax.Instance(syntax.Decl(label, (), component.name.span), kind, tuple(args), tuple(connections), span)
-    return syntax.Model(syntax.Word(f"a user of {component.name.name}", span), (*around, instance), span)
+    instance = syntax.InstanceStatement(
+        syntax.Decl(label, (), component.name.span), kind, tuple(args), tuple(connections), span
+    )
+    return syntax.ModelDefinition(syntax.Word(f"a user of {component.name.name}", span), (*around, instance), span)
 
 
 def _parameters(
     said: Iterable[syntax.Statement], sizes: Collection[str], *, every: bool = False
 ) -> tuple[list[syntax.Statement], list[syntax.Arg]]:
     """Parameters of the model, one for each that must be given, or for every one; how they are given."""
-    own = [s for s in said if isinstance(s, syntax.Param) and (every or s.value is None)]
+    own = [s for s in said if isinstance(s, syntax.ParamStatement) and (every or s.value is None)]
     found = list[syntax.Statement]()
     for s in own:
         size = s.value is None and s.decl.name in sizes
@@ -136,19 +144,19 @@ def _parameters(
 def _surroundings(port: _Port) -> tuple[syntax.Statement, list[syntax.Connection]]:
     """What stands at a port, the branches of a statement, or an input, and how it is connected."""
     match port:
-        case syntax.Input():
+        case syntax.InputStatement():
             inner = replace(port, unit=_plain(port.unit), value=None)
             return inner, [syntax.Bind(syntax.Word(port.decl.name, port.span), _name(port.decl), port.span)]
-        case syntax.Port():
+        case syntax.PortStatement():
             ends = [syntax.Bind(syntax.Word(d.name, d.span), _name(d), d.span) for d in port.decls]
-            return syntax.Node(port.decls, port.domain, None, port.span), [*ends]
+            return syntax.NodeStatement(port.decls, port.domain, None, port.span), [*ends]
     nodes, found = list[syntax.Decl](), list[syntax.Connection]()
     for d in port.decls or (syntax.Decl("", (), port.span),):
         plus, minus = (syntax.Decl(f"{d.name}{end}", d.indices, d.span) for end in ("+", "-"))
         nodes += [plus, minus]
         between = _name(plus), _name(minus), d.span
         found.append(syntax.BindAcross(syntax.Word(d.name, d.span), *between) if d.name else syntax.Across(*between))
-    return syntax.Node(tuple(nodes), port.domain, None, port.span), found
+    return syntax.NodeStatement(tuple(nodes), port.domain, None, port.span), found
 
 
 def _below(found: Iterable[object]) -> Iterator[syntax.Name]:
@@ -165,7 +173,7 @@ def _name(decl: syntax.Decl) -> syntax.Name:
     return syntax.Name(decl.name, decl.span)
 
 
-def _plain(unit: syntax.Unit) -> syntax.Unit:
+def _plain(unit: syntax.UnitExpression) -> syntax.UnitExpression:
     """A unit without its variables."""
     factors = tuple(f for f in unit.factors if not f.name.startswith("$"))
     return replace(unit, factors=factors)

@@ -12,10 +12,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 from sysdyn.cli.analysis.asked import Found
-from sysdyn.cli.analysis.linear import Linear, linearise
+from sysdyn.cli.analysis.linear import Linearisation, linearise
 from sysdyn.cli.analysis.states import state_of
 from sysdyn.cli.page.columns import align, complex_text
-from sysdyn.cli.run.request.asked import Request
+from sysdyn.cli.run.request.asked import RunRequest
 from sysdyn.dsl.model import expression as ex
 from sysdyn.dsl.model.units import si_text
 from sysdyn.dsl.text.diagnostics import Report
@@ -54,7 +54,7 @@ class Locus:
     failed: tuple[tuple[float, str], ...]
 
 
-def answers(linear: Linear) -> tuple[Answer, ...]:
+def answers(linear: Linearisation) -> tuple[Answer, ...]:
     """Of every output by every input, over one range of frequencies and one of times."""
     if not linear.transfers:
         return ()
@@ -63,7 +63,7 @@ def answers(linear: Linear) -> tuple[Answer, ...]:
     return tuple(_answer(linear, t, low, high, end) for t in linear.transfers)
 
 
-def _answer(linear: Linear, transfer: Transfer, low: float, high: float, end: float) -> Answer:
+def _answer(linear: Linearisation, transfer: Transfer, low: float, high: float, end: float) -> Answer:
     """Frequency response, margins and step response of one transfer function."""
     time, step = responses.step(linear.reduced, transfer, end)
     return Answer(
@@ -120,7 +120,7 @@ def _margins(m: Margins) -> list[str]:
     return found
 
 
-def locus(request: Request, name: str, along: Sequence[float], *, rest: bool, found: Found) -> Locus:
+def locus(request: RunRequest, name: str, along: Sequence[float], *, rest: bool, found: Found) -> Locus:
     """Eigenvalues over values (SI) of a parameter: each is compiled in, its state found anew."""
     sets, kept, failed = [], [], []
     for value in along:
@@ -134,7 +134,9 @@ def locus(request: Request, name: str, along: Sequence[float], *, rest: bool, fo
     return Locus(name, units[name.partition("[")[0]], np.array(kept), responses.branches(sets), tuple(failed))
 
 
-def _eigenvalues(request: Request, name: str, value: float, *, rest: bool) -> tuple[NDArray[np.complex128] | None, str]:
+def _eigenvalues(
+    request: RunRequest, name: str, value: float, *, rest: bool
+) -> tuple[NDArray[np.complex128] | None, str]:
     """Eigenvalues where a parameter has another value, or why there are none."""
     settings = (*((n, v) for n, v in request.settings if n != name), (name, repr(value)))
     report = Report()

@@ -12,7 +12,7 @@ from sysdyn.cli.failures import UsageError
 from sysdyn.cli.run.events import plan
 from sysdyn.cli.run.prepare import Prepared, prepare
 from sysdyn.cli.run.request import targets
-from sysdyn.cli.run.request.asked import Request, options_of, rest, stops, turning
+from sysdyn.cli.run.request.asked import RunRequest, options_of, rest, stops, turning
 from sysdyn.cli.run.request.targets import Target
 from sysdyn.cli.run.start.flat_laws import impossible
 from sysdyn.cli.run.start.starting import Started, start
@@ -51,7 +51,7 @@ class Found:
 
 
 def compile_target(
-    request: Request,
+    request: RunRequest,
     report: Report,
     outputs: tuple[str, ...] | None = None,
     also: Callable[[Network], tuple[str, ...]] | None = None,
@@ -109,7 +109,7 @@ def own_inputs(target: Target, network: Network) -> tuple[str, ...]:
 def _input_names(target: Target, inputs: Inputs) -> tuple[str, ...]:
     """Names of the inputs asked for, without indices; the model's own where none is asked for."""
     if inputs is None:
-        return tuple(s.decl.name for s in target.model.body if isinstance(s, syntax.Input))
+        return tuple(s.decl.name for s in target.model.body if isinstance(s, syntax.InputStatement))
     return tuple(text.partition("[")[0].strip() for text in inputs)
 
 
@@ -154,7 +154,7 @@ def of_nodes(network: Network) -> tuple[str, ...]:
     return tuple(f"{n.name}.e" for n in nodes) if len(nodes) <= STORES else ()
 
 
-def model_at_start(target: Target, prepared: Prepared, request: Request, report: Report) -> Found | None:
+def model_at_start(target: Target, prepared: Prepared, request: RunRequest, report: Report) -> Found | None:
     """The model at its start; None where the report says what is in the way."""
     started = start(prepared, prepared.begin, report, request.redundancy)
     if started is None or report.failed:
@@ -162,7 +162,7 @@ def model_at_start(target: Target, prepared: Prepared, request: Request, report:
     return Found(target, prepared, started.system, started.state, prepared.binding, started)
 
 
-def model_at_instant(found: Found, request: Request, report: Report) -> tuple[Found | None, str | None]:
+def model_at_instant(found: Found, request: RunRequest, report: Report) -> tuple[Found | None, str | None]:
     """The model at the instant `request.until`, and why its run did not come there (exit 3)."""
     asked = load.constant(found.target.document, request.until or "", dim.TIME, "--at", report)
     if asked is None:

@@ -7,14 +7,14 @@ import json
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from sysdyn.cli.analysis.linear import Linear
+from sysdyn.cli.analysis.linear import Linearisation
 from sysdyn.cli.console import finite
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
 
-def arrays(linear: Linear) -> dict[str, NDArray[Any]]:
+def arrays(linear: Linearisation) -> dict[str, NDArray[Any]]:
     """Matrices by name: E A B C Cd D of the form, a b c d d1 d2 of the reduction, eigenvalues, participation."""
     form, small = linear.descriptor, linear.reduced
     found: dict[str, NDArray[Any]] = {"E": form.e, "A": form.a, "B": form.b, "C": form.c, "Cd": form.cd, "D": form.d}
@@ -28,7 +28,7 @@ def arrays(linear: Linear) -> dict[str, NDArray[Any]]:
     return found
 
 
-def names(linear: Linear) -> dict[str, tuple[str, ...]]:
+def names(linear: Linearisation) -> dict[str, tuple[str, ...]]:
     """What rows and columns stand for."""
     return {
         "states": linear.descriptor.states,
@@ -39,7 +39,7 @@ def names(linear: Linear) -> dict[str, tuple[str, ...]]:
     }
 
 
-def written(linear: Linear, kind: str, result: dict[str, Any]) -> bytes:
+def written(linear: Linearisation, kind: str, result: dict[str, Any]) -> bytes:
     """The file's content; result: the object of --json, which is what .json holds."""
     match kind:
         case ".h5":
@@ -49,7 +49,7 @@ def written(linear: Linear, kind: str, result: dict[str, Any]) -> bytes:
     return (json.dumps(finite(result), indent=1, allow_nan=False) + "\n").encode()
 
 
-def _hdf5(linear: Linear) -> bytes:
+def _hdf5(linear: Linearisation) -> bytes:
     """Complex numbers as pairs (re, im); names as fixed-length strings; transfer functions in groups by number."""
     import h5py
 
@@ -84,7 +84,7 @@ def _pairs(value: NDArray[Any]) -> NDArray[np.float64]:
     return np.asarray(value, dtype=np.float64)
 
 
-def _mat(linear: Linear) -> bytes:
+def _mat(linear: Linearisation) -> bytes:
     """The linearisation as a MATLAB file of level 5, the same bytes each time."""
     from scipy.io import savemat
 

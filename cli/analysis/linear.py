@@ -45,7 +45,7 @@ VELOCITIES, MOMENTA = ("m/s", "rad/s"), ("N.s", "N.m.s")
 
 
 @dataclass(frozen=True, slots=True)
-class Linear:
+class Linearisation:
     """A linearisation at t [s]; moving: a state whose motion changes the matrices; steady: one that moves and does
     not; energies [modes, stores]: shares of each; units: of inputs (SI) and outputs (as traced) by name.
     """
@@ -82,7 +82,7 @@ def inputs_of(target: Target, prepared: Prepared, asked: Sequence[str] | None) -
         boxes = prepared.binding.parameters.boxes
         ranges_of = {n: [range(a, b + 1) for a, b in boxes.get(n, ())] for n in own_inputs(target, prepared.network)}
         return tuple((name, at) for name, ranges in ranges_of.items() for at in product(*ranges))
-    own = [s.decl.name for s in target.model.body if isinstance(s, syntax.Input)]
+    own = [s.decl.name for s in target.model.body if isinstance(s, syntax.InputStatement)]
     found: list[Input] = []
     # `u`, `u[2]`, or a parameter
     for text in asked:
@@ -94,7 +94,9 @@ def inputs_of(target: Target, prepared: Prepared, asked: Sequence[str] | None) -
             if name in own:
                 raise UsageError(f"input '{name}' is an array by a formula: --set {name}=[...] gives it numbers")
             near, element = nearest(name, [*known, *own]), name.partition(".")[0]
-            if near is None and element in (s.decl.name for s in target.model.body if isinstance(s, syntax.Instance)):
+            if near is None and element in (
+                s.decl.name for s in target.model.body if isinstance(s, syntax.InstanceStatement)
+            ):
                 how = f"an input in its formula, 'input u ... = 0' and '{element}: ...( ... + u)', moves it"
                 raise UsageError(f"--inputs: '{name}' is no parameter or input, but what an element gives: {how}")
             listed = f"nearest: '{near}'" if near else f"there are: {', '.join(known) or 'none'}"
@@ -115,7 +117,7 @@ def loose_of(found: Found) -> NDArray[np.bool_]:
     return quadratures(found.system, tangible)
 
 
-def linearise(found: Found, inputs: Sequence[Input], index: str = "3", watched: Sequence[int] = ()) -> Linear:
+def linearise(found: Found, inputs: Sequence[Input], index: str = "3", watched: Sequence[int] = ()) -> Linearisation:
     """The linearisation at the state of `found`; watched: places of unknowns that are outputs too, the last ones.
 
     Raises NoLinearisation.
@@ -153,7 +155,7 @@ def linearise(found: Found, inputs: Sequence[Input], index: str = "3", watched: 
     transfers = tuple(_transfer(small, i, j) for i, j in pairs)
     moves, steady = _felt_moves(system, small, found)
     named = transfers, labels, names, moves, steady, stores, energies, _units(found.prepared.network)
-    return Linear(state.t, state.y, descriptor, small, own, *named)
+    return Linearisation(state.t, state.y, descriptor, small, own, *named)
 
 
 def _units(network: Network) -> dict[str, str]:

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 from sysdyn.cli.analysis.answers import Answer, Locus
-from sysdyn.cli.analysis.linear import Linear
+from sysdyn.cli.analysis.linear import Linearisation
 from sysdyn.cli.page.document import document, escape, table
 from sysdyn.cli.page.panels import COLOURS
 from sysdyn.cli.page.picture import drawing
@@ -20,7 +20,7 @@ TALL = 1e3
 
 
 def picture(
-    title: str, linear: Linear, found: Sequence[Answer], locus: Locus | None, kinds: Sequence[str], kind: str
+    title: str, linear: Linearisation, found: Sequence[Answer], locus: Locus | None, kinds: Sequence[str], kind: str
 ) -> bytes:
     """kinds: of bode, nyquist, step, poles, locus; kind: png or svg."""
     found = found[:MOST]
@@ -134,7 +134,7 @@ def _title(found: Sequence[Answer]) -> str:
     return found[0].label if len(found) == 1 else ""
 
 
-def _poles(axis: Any, linear: Linear) -> None:
+def _poles(axis: Any, linear: Linearisation) -> None:
     """Eigenvalues as crosses, zeros of the transfer functions as circles."""
     values = np.array([m.eigenvalue for m in linear.modes])
     axis.axvline(0.0, color="#9aa0a6", linewidth=0.8)

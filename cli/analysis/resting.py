@@ -11,7 +11,7 @@ from sysdyn.cli.analysis.asked import Found, compile_target, of_nodes
 from sysdyn.cli.analysis.linear import linearise, loose_of
 from sysdyn.cli.analysis.states import model_at_rest, resting
 from sysdyn.cli.page.columns import complex_text
-from sysdyn.cli.run.request.asked import Request
+from sysdyn.cli.run.request.asked import RunRequest
 from sysdyn.cli.run.request.targets import still
 from sysdyn.dsl.model.units import Unit, quantity
 from sysdyn.dsl.text.diagnostics import Report
@@ -109,7 +109,7 @@ class Equilibrium:
 
 
 def equilibria(
-    request: Request, tries: int, report: Report, progress: Progress | None = None
+    request: RunRequest, tries: int, report: Report, progress: Progress | None = None
 ) -> tuple[Found, tuple[Equilibrium, ...], str] | None:
     """The model and its states of rest, and what is to be said where it has none; None where the report says why it has
     none to be asked of.

@@ -14,7 +14,7 @@ from sysdyn.cli.page.unit_text import conversion
 from sysdyn.runtime.comparison.compare import compare
 from sysdyn.runtime.comparison.curve import Floats
 from sysdyn.runtime.comparison.recorded import Recorded
-from sysdyn.runtime.comparison.verdict import About, Compared, Event, Source, Tolerance, Verdict
+from sysdyn.runtime.comparison.verdict import About, Compared, Source, Tolerance, TraceEvent, Verdict
 from sysdyn.runtime.trace.opening import regular
 from sysdyn.values import dataclass
 
@@ -60,7 +60,7 @@ class Common:
         return self.whole.time_unit
 
     @property
-    def events(self) -> tuple[Event, ...]:
+    def events(self) -> tuple[TraceEvent, ...]:
         """Events."""
         return self.whole.events
 

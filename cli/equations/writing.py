@@ -10,7 +10,7 @@ from collections.abc import Sequence
 
 from sysdyn.cli.equations.letters import GREEK, SHORT, Letter, Letters, letter_of_name
 from sysdyn.compiler.equations.book import Summed
-from sysdyn.compiler.equations.order import Order
+from sysdyn.compiler.equations.order import FactorOrder
 from sysdyn.dsl.model.expression import Node, topological
 from sysdyn.dsl.model.network import Loop
 
@@ -23,12 +23,12 @@ _SIGNS = {"==": "=", "!=": "≠", "<": "<", "<=": "≤", ">": ">", ">=": "≥"}
 Piece = tuple[str, int]
 
 
-class Writer(ABC):
+class ExpressionWriter(ABC):
     """Writes expressions of one model."""
 
     minus = "-"
 
-    def __init__(self, letters: Letters, order: Order) -> None:
+    def __init__(self, letters: Letters, order: FactorOrder) -> None:
         self.letters = letters
         self._rank = order.rank
 
@@ -249,7 +249,7 @@ class Writer(ABC):
         return (texts[0], args[0][1]) if node.data == "signal" else (self.function(node.data, texts), ATOM)
 
 
-class Text(Writer):
+class TextWriter(ExpressionWriter):
     """For a terminal: f1', kappa as κ1, products side by side."""
 
     def symbol(self, letter: Letter, index: Sequence[str]) -> str:
@@ -297,7 +297,7 @@ class Text(Writer):
         return f"δ{text}" if strength == ATOM else f"δ({text})"
 
 
-class Latex(Writer):
+class Latex(ExpressionWriter):
     """For LaTeX's mathematics."""
 
     bare_below = True

@@ -8,7 +8,7 @@ from contextlib import contextmanager
 from sysdyn.cli.export.layout import Formed, choose
 from sysdyn.cli.run.prepare import Prepared
 from sysdyn.cli.run.request import targets
-from sysdyn.cli.run.request.asked import Request
+from sysdyn.cli.run.request.asked import RunRequest
 from sysdyn.cli.run.start.flat_laws import impossible
 from sysdyn.cli.run.start.starting import start
 from sysdyn.dsl import load
@@ -18,7 +18,7 @@ from sysdyn.dsl.text.diagnostics import Report
 from sysdyn.runtime.model.failures import NoSuchForm
 
 
-def network_of(request: Request, report: Report) -> Network | None:
+def network_of(request: RunRequest, report: Report) -> Network | None:
     """The model that is named, whole, or under the scene that is; None where the report says why not."""
     target = targets.target_of(request, report, targets.whole)
     if target is None:

@@ -8,7 +8,7 @@ from __future__ import annotations
 import numpy as np
 from sysdyn.cli.export.binding_json import parameters
 from sysdyn.cli.export.layout import Formed
-from sysdyn.cli.export.tables import Tables
+from sysdyn.cli.export.tables import ExportTables
 from sysdyn.compiler.binding.following import Following
 from sysdyn.compiler.forms.descriptor import DescriptorForm
 from sysdyn.dsl.model.calculus import derivative
@@ -23,7 +23,7 @@ MOST = 60
 _INERTIAL = ("dynamics", "momentum", "lambda", "gamma")
 
 
-def index_parameters(formed: Formed, tables: Tables, following: Following) -> list[str]:
+def index_parameters(formed: Formed, tables: ExportTables, following: Following) -> list[str]:
     """Names of the parameters that may change the index, in the order of the manifest."""
     compiled = formed.prepared.compiled
     names = [p.name for p in compiled.network.parameters]

@@ -4,11 +4,19 @@ from __future__ import annotations
 
 import numpy as np
 from sysdyn.cli.export.starts import start_tables
-from sysdyn.cli.export.tables import NOTHING, Call, Group, Output, State, Tables, assembly_tables
+from sysdyn.cli.export.tables import (
+    NOTHING,
+    BlockCall,
+    ExportTables,
+    FollowingGroup,
+    StateSelection,
+    TracedOutput,
+    assembly_tables,
+)
 from sysdyn.cli.run.prepare import Prepared
 from sysdyn.cli.run.start.starting import Started
 from sysdyn.compiler.binding.following import Following, following
-from sysdyn.compiler.binding.following import Group as Formulas
+from sysdyn.compiler.binding.following import FormulaGroup as Formulas
 from sysdyn.compiler.forms import descriptor
 from sysdyn.runtime.accuracy.options import Options
 from sysdyn.runtime.integrate.underlying import Accelerations, Selection, Underlying, underlying_form
@@ -62,7 +70,7 @@ def choose(prepared: Prepared, started: Started, index: str | None) -> Formed:
     return Formed(prepared, written, system, state, facts, warnings)
 
 
-def tables(formed_: Formed) -> tuple[Tables, Following]:
+def tables(formed_: Formed) -> tuple[ExportTables, Following]:
     """All numbers of the export, and the formulas that belong to them."""
     prepared, system, state = formed_.prepared, formed_.system, formed_.state
     compiled = prepared.compiled
@@ -83,7 +91,7 @@ def tables(formed_: Formed) -> tuple[Tables, Following]:
     observe, observed = _observer(system, "observe")
     audit, audited = _observer(system, "audit")
     names = [p.name for p in compiled.network.parameters if not p.shape]
-    return Tables(
+    return ExportTables(
         form=system.form.name,
         t0=state.t,
         p=prepared.binding.p,
@@ -129,11 +137,11 @@ def _refuse_massless(system: System, state: ConsistentState) -> None:
         )
 
 
-def _state(system: System, state: ConsistentState) -> State:
+def _state(system: System, state: ConsistentState) -> StateSelection:
     """The tables of the underlying equation.  NoSuchForm where its Jacobian is too large to be written."""
     selection = Underlying(system, np.ones(system.unknowns)).selection
     places = np.flatnonzero(np.isin(system.kinds, STATE)).astype(np.int32)
-    return State(places, selection, *_pattern(system, selection, places))
+    return StateSelection(places, selection, *_pattern(system, selection, places))
 
 
 def _pattern(system: System, selection: Selection, places: Ints) -> tuple[Ints, Ints]:
@@ -176,7 +184,7 @@ def _pattern(system: System, selection: Selection, places: Ints) -> tuple[Ints, 
     return full.indptr.astype(np.int32), full.indices.astype(np.int32)
 
 
-def state_jacobian(tables_: Tables, system: System, t: float, y: Floats, yd: Floats, cj: float) -> Floats:
+def state_jacobian(tables_: ExportTables, system: System, t: float, y: Floats, yd: Floats, cj: float) -> Floats:
     """Entries of dF/dy + cj dF/dyd of r = yd - F(t, y); y, yd: the full layout with everything solved for.
 
     A column of dF/dy is -A^-1 times the derivatives of the rows by that unknown.
@@ -213,12 +221,12 @@ def _scale(written: System, state: ConsistentState) -> Floats:
     return starter.scale(state.t, starter.unknowns(state.t, state.y, state.yd))[: written.form.written]
 
 
-def _observer(system: System, block: str) -> tuple[Call | None, int]:
+def _observer(system: System, block: str) -> tuple[BlockCall | None, int]:
     """An observing block whose rows begin at 0, and their number."""
     if block not in system.description.blocks:
         return None, 0
     to, number = system.observed_rows(block)
-    return Call(block, system.form.at, to, NOTHING, NOTHING), number
+    return BlockCall(block, system.form.at, to, NOTHING, NOTHING), number
 
 
 def _audit_at(system: System) -> Ints:
@@ -231,13 +239,13 @@ def _audit_at(system: System) -> Ints:
     return found
 
 
-def _outputs(system: System) -> tuple[Output, ...]:
-    return tuple(Output(c.name, c.unit, c.place) for c in columns_of(system.description))
+def _outputs(system: System) -> tuple[TracedOutput, ...]:
+    return tuple(TracedOutput(c.name, c.unit, c.place) for c in columns_of(system.description))
 
 
-def _group(group: Formulas, system: System) -> Group:
+def _group(group: Formulas, system: System) -> FollowingGroup:
     """A group of formulas with its places in y."""
     target = group.target
     if group.kind == "initial":
         target = target + system.another("start").form.at[group.family]
-    return Group(group.block, group.kind, group.entries, group.source, target)
+    return FollowingGroup(group.block, group.kind, group.entries, group.source, target)

@@ -14,10 +14,10 @@ from typing import Any
 import numpy as np
 from sysdyn.cli.compare.diffing import as_json, cases, common, differences, headline
 from sysdyn.cli.failures import UsageError
-from sysdyn.cli.golden.book import Golden
-from sysdyn.cli.golden.runs import Run, Stopped, between, run
+from sysdyn.cli.golden.book import GoldenScene
+from sysdyn.cli.golden.runs import GoldenRun, Stopped, between, run
 from sysdyn.cli.golden.structures import describe_change
-from sysdyn.cli.run.request.asked import Request
+from sysdyn.cli.run.request.asked import RunRequest
 from sysdyn.runtime.comparison.arrays import Arrays
 from sysdyn.runtime.comparison.curve import Floats
 from sysdyn.runtime.comparison.recorded import Recorded
@@ -74,16 +74,16 @@ class Mutant:
     insensitive: bool = False
 
 
-def request_of(golden: Golden, **options: Any) -> Request:
+def request_of(golden: GoldenScene, **options: Any) -> RunRequest:
     """The run that a golden asks for."""
     if not golden.model.is_file():
         raise FileNotFoundError(2, "no such model", str(golden.model))
     known: dict[str, Any] = {"settings": golden.settings, "until": golden.until, "accuracy": golden.accuracy}
     named = {"scene": golden.scene} if golden.scene else {"model": golden.name}
-    return Request(str(golden.model), **(known | named | options))
+    return RunRequest(str(golden.model), **(known | named | options))
 
 
-def load_golden(golden: Golden) -> Arrays:
+def load_golden(golden: GoldenScene) -> Arrays:
     """The kept trace.  Raises TraceError, Incomparable, OSError."""
     golden.trace.open("rb").close()
     with Recorded(golden.trace) as source:
@@ -98,7 +98,7 @@ def load_golden(golden: Golden) -> Arrays:
         )
 
 
-def structure_of(golden: Golden, formulation: str) -> dict[str, Any]:
+def structure_of(golden: GoldenScene, formulation: str) -> dict[str, Any]:
     """The kept structure of one formulation.  Raises TraceError, OSError."""
     text = golden.structure.read_bytes()
     try:
@@ -110,7 +110,7 @@ def structure_of(golden: Golden, formulation: str) -> dict[str, Any]:
 
 
 def check(
-    golden: Golden,
+    golden: GoldenScene,
     formulations: Sequence[str],
     methods: Sequence[str],
     backends: Sequence[str],
@@ -126,7 +126,7 @@ def check(
                 yield _case(golden, formulation, method, backend, with_page)
 
 
-def _case(golden: Golden, formulation: str, method: str, backend: str, with_page: bool) -> Case:
+def _case(golden: GoldenScene, formulation: str, method: str, backend: str, with_page: bool) -> Case:
     """Run one formulation, method and backend of a golden and compare; what stops it is the case's message and exit
     code.
     """
@@ -190,12 +190,12 @@ def _case(golden: Golden, formulation: str, method: str, backend: str, with_page
     )
 
 
-def _verdict(golden: Golden, kept: Arrays, one: Run, structure: dict[str, Any]) -> Verdict:
+def _verdict(golden: GoldenScene, kept: Arrays, one: GoldenRun, structure: dict[str, Any]) -> Verdict:
     """A formulation is compared on the quantities that it had when it was recorded."""
     return differences(common(kept, set(structure["quantities"])), one.trace, tolerance_of(golden))
 
 
-def tolerance_of(golden: Golden) -> Tolerance:
+def tolerance_of(golden: GoldenScene) -> Tolerance:
     """The tube of a golden."""
     return Tolerance(golden.rtol, golden.atol, golden.tau)
 
@@ -207,7 +207,7 @@ def _structural(kept: dict[str, Any], found: dict[str, Any]) -> list[tuple[str, 
     return [(f"structure: {name}", None if a == b else describe_change(name, a, b)) for name, a, b in facts]
 
 
-def _meters(golden: Golden, one: Run) -> list[tuple[str, str | None]]:
+def _meters(golden: GoldenScene, one: GoldenRun) -> list[tuple[str, str | None]]:
     """The meters against their bounds."""
     found: list[tuple[str, str | None]] = []
     for name, value, bound, unit in (
@@ -220,7 +220,7 @@ def _meters(golden: Golden, one: Run) -> list[tuple[str, str | None]]:
     return found
 
 
-def mutate(golden: Golden) -> Iterator[Mutant]:
+def mutate(golden: GoldenScene) -> Iterator[Mutant]:
     """Each parameter of the scene changed by SHARE: does the golden notice?  Raises Stopped where no run succeeds."""
     kept = load_golden(golden)
     formulation = golden.formulations[0]
@@ -271,7 +271,7 @@ def _some(parameters: dict[str, float]) -> list[str]:
     return picked
 
 
-def _effect(base: Run, mutant: Run, tolerance: Tolerance) -> float:
+def _effect(base: GoldenRun, mutant: GoldenRun, tolerance: Tolerance) -> float:
     """How far the change moves the traces at the instants that both hold, in limits."""
     instants = np.intersect1d(base.trace.time, mutant.trace.time)
     one, two = (_rows_at(r.trace, instants) for r in (base, mutant))

@@ -8,7 +8,7 @@ from typing import Any
 
 from sysdyn.cli.page.columns import align
 from sysdyn.dsl.format.format import format_expression
-from sysdyn.dsl.load import Document, Listing
+from sysdyn.dsl.load import Listing, ParsedFile
 from sysdyn.dsl.model.network import Parameter
 from sysdyn.dsl.model.values import Values
 from sysdyn.dsl.tree import syntax
@@ -19,9 +19,9 @@ _ROUND = 12
 """Digits shown of a value: those that a change of units spoils are left out."""
 
 
-def account(document: Document, model: syntax.Model, found: Listing) -> dict[str, Any]:
+def account(document: ParsedFile, model: syntax.ModelDefinition, found: Listing) -> dict[str, Any]:
     """Everything about a model as the JSON object of `sysdyn list`."""
-    docs = {s.decl.name: s.doc for s in model.body if isinstance(s, (syntax.Param, syntax.Input))}
+    docs = {s.decl.name: s.doc for s in model.body if isinstance(s, (syntax.ParamStatement, syntax.InputStatement))}
     parameters: list[dict[str, Any]] = []
     inputs: list[dict[str, Any]] = []
     # parameters and inputs with their values
@@ -31,7 +31,7 @@ def account(document: Document, model: syntax.Model, found: Listing) -> dict[str
         entry |= {"doc": docs.get(name), "line": parameter.place.start[0], "file": parameter.place.file}
         (inputs if name in found.inputs else parameters).append(entry)
     held = {i["name"] for i in inputs}
-    statements = {s.decl.name: s for s in model.body if isinstance(s, syntax.Input)}
+    statements = {s.decl.name: s for s in model.body if isinstance(s, syntax.InputStatement)}
     # inputs by formulas
     for name in found.inputs:
         if name not in held:
@@ -83,17 +83,17 @@ def _shape(parameter: Parameter, known: Values) -> str:
     return f"[{', '.join(f'{a:g}..{b:g}' for a, b in bounds)}]"
 
 
-def _scene(scene: syntax.Scene) -> dict[str, Any]:
+def _scene(scene: syntax.SceneDefinition) -> dict[str, Any]:
     """Name, span, what is traced, and what is set."""
     found: dict[str, Any] = {"name": scene.name.name, "doc": scene.doc, "time": None, "trace": [], "set": []}
     for s in scene.body:
-        if isinstance(s, syntax.Time):
+        if isinstance(s, syntax.TimeStatement):
             found["time"] = f"{format_expression(s.start)} to {format_expression(s.stop)}"
-        elif isinstance(s, syntax.Trace):
+        elif isinstance(s, syntax.TraceStatement):
             found["trace"] += [i.alias.name if i.alias else format_expression(i.expr) for i in s.items]
-        elif isinstance(s, syntax.Set):
+        elif isinstance(s, syntax.SetStatement):
             found["set"].append(f"{format_expression(s.target)} = {format_expression(s.value)}")
-        elif isinstance(s, syntax.SceneLevel):
+        elif isinstance(s, syntax.SceneLevelStatement):
             found["set"].append(f"level {format_expression(s.target)} = {s.level.name}")
     return found
 

@@ -18,7 +18,7 @@ from sysdyn.values import dataclass
 
 
 @dataclass(frozen=True, slots=True)
-class Study:
+class ReportStudy:
     """sources: the texts of the model, its own first; ran, trace: None where there was no run; shares: the energy of
     each element over the run, None where it was not measured; findings: what is to be said first; stages: (stage, wall
     s, CPU s).

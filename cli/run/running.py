@@ -15,11 +15,11 @@ from sysdyn.cli.run.many.memory import keep_pages
 from sysdyn.cli.run.module_check import check_module
 from sysdyn.cli.run.prepare import Prepared, prepare
 from sysdyn.cli.run.request import lock, targets
-from sysdyn.cli.run.request.asked import Request, check_tolerances, default_output, options_of, rest, stops, turning
+from sysdyn.cli.run.request.asked import RunRequest, check_tolerances, default_output, options_of, rest, stops, turning
 from sysdyn.cli.run.request.targets import Target
 from sysdyn.cli.run.start.flat_laws import impossible
 from sysdyn.cli.run.start.starting import Started, start
-from sysdyn.cli.run.verdict.expectations import Claim, judge
+from sysdyn.cli.run.verdict.expectations import JudgedClaim, judge
 from sysdyn.cli.run.verdict.verdict import author_place, differences, note_rest, report_stop, verdict
 from sysdyn.compiler.forms.kane import repeats
 from sysdyn.dsl import load
@@ -44,7 +44,7 @@ class Ran:
     prepared: Prepared
     started: Started
     outcome: Outcome
-    claims: tuple[Claim, ...]
+    claims: tuple[JudgedClaim, ...]
     exit: int
     failure: str | None = None
 
@@ -56,7 +56,7 @@ def finding(diagnostics: Iterable[Diagnostic]) -> dict[str, Any] | None:
     return None if first is None else first.to_json()
 
 
-def run(request: Request, report: Report, progress: Progress | None = None) -> Ran | None:
+def run(request: RunRequest, report: Report, progress: Progress | None = None) -> Ran | None:
     """Simulate; None where the report says why not.  UsageError, OSError and TraceError pass through."""
     began = time.monotonic()
     keep_pages()
@@ -78,7 +78,7 @@ def run(request: Request, report: Report, progress: Progress | None = None) -> R
         return None if prepared is None or options is None else integrate(target, prepared, options, report)
 
 
-def _apply_lock(request: Request, target: Target, report: Report) -> tuple[Request, lock.Taken | None]:
+def _apply_lock(request: RunRequest, target: Target, report: Report) -> tuple[RunRequest, lock.Taken | None]:
     """The request with what the file's lock says where neither it nor the scene does."""
     held = None if request.no_lock else lock.read(request.file, target, __version__, report)
     if held is None:
@@ -100,7 +100,7 @@ def _under(options: Options, found: lock.Taken) -> Options:
     return replace(options, first=first, attributes={**options.attributes, "lock": found.text})
 
 
-def ready(request: Request, target: Target, report: Report) -> Prepared | None:
+def ready(request: RunRequest, target: Target, report: Report) -> Prepared | None:
     """The target under the request's settings, compiled and bound; None where the report says why not."""
     inner = Report()
     network = load.network(target.document, target.model, target.scene, inner, request.settings, levels=request.levels)

@@ -5,15 +5,17 @@ from __future__ import annotations
 from collections.abc import Callable
 from itertools import combinations_with_replacement
 
-from sysdyn.cli.spice.devices import Element, Scope, enough
-from sysdyn.cli.spice.netlist import Card, Unreadable, value
+from sysdyn.cli.spice.devices import CircuitScope, DeviceText, enough
+from sysdyn.cli.spice.netlist import Card, UnreadableCard, value
 from sysdyn.cli.spice.writing import plain, quantity
 
 
-def controlled_source(kind: str, letter: str, unit: str, *, by_current: bool) -> Callable[[Card, Scope], Element]:
+def controlled_source(
+    kind: str, letter: str, unit: str, *, by_current: bool
+) -> Callable[[Card, CircuitScope], DeviceText]:
     """E, G, F, H: an effort or a flow that is a gain or a polynomial of voltages or currents."""
 
-    def element(card: Card, scope: Scope) -> Element:
+    def element(card: Card, scope: CircuitScope) -> DeviceText:
         words = enough(card, 5)
         name, a, b = scope.name[card.head], scope.node(words[1]), scope.node(words[2])
         times, words = _times(words, scope, kind == "flow")
@@ -23,7 +25,7 @@ def controlled_source(kind: str, letter: str, unit: str, *, by_current: bool) ->
         controls, numbers = rest[: size * count], rest[size * count :]
         if "=" in words or any("=" in w for w in words) or len(controls) < size * count or not numbers:
             form = "VSOURCE GAIN" if by_current else "NC+ NC- GAIN"
-            raise Unreadable(f"'{card.text[:60]}': NAME N+ N- {form} or POLY(n); expressions are not known")
+            raise UnreadableCard(f"'{card.text[:60]}': NAME N+ N- {form} or POLY(n); expressions are not known")
         read = [
             _through(scope, controls[k]) if by_current else _between(scope, *controls[2 * k : 2 * k + 2])
             for k in range(count)
@@ -34,15 +36,15 @@ def controlled_source(kind: str, letter: str, unit: str, *, by_current: bool) ->
             text = _polynomial(gains, read, "A" if by_current else "V", "V" if kind == "effort" else "A")
         # something behind the gain
         elif len(gains) > 1:
-            raise Unreadable(f"'{card.text[:60]}': '{numbers[1]}' behind the gain is not known")
+            raise UnreadableCard(f"'{card.text[:60]}': '{numbers[1]}' behind the gain is not known")
         else:
             text = f"{_factor(gains[0], unit)}*{read[0]}"
-        return Element((f"{name}: {kind}({letter} = {text}) {a} -> {b}",))
+        return DeviceText((f"{name}: {kind}({letter} = {text}) {a} -> {b}",))
 
     return element
 
 
-def _times(words: tuple[str, ...], scope: Scope, parallel: bool) -> tuple[float, tuple[str, ...]]:
+def _times(words: tuple[str, ...], scope: CircuitScope, parallel: bool) -> tuple[float, tuple[str, ...]]:
     """M of a current source, and the words without it."""
     if parallel and words[-3:-1] == ("m", "="):
         return value(words[-1], scope.known), words[:-3]
@@ -52,16 +54,18 @@ def _times(words: tuple[str, ...], scope: Scope, parallel: bool) -> tuple[float,
 def _order(words: tuple[str, ...]) -> int:
     """How many quantities a polynomial reads."""
     if len(words) < 5:
-        raise Unreadable("POLY without a number of controlling quantities")
+        raise UnreadableCard("POLY without a number of controlling quantities")
     if not words[4].isdecimal() or not 0 < int(words[4][:6]) <= len(words):
-        raise Unreadable(f"POLY({words[4]}): a number of controlling quantities is wanted")
+        raise UnreadableCard(f"POLY({words[4]}): a number of controlling quantities is wanted")
     return int(words[4])
 
 
 def _polynomial(gains: list[float], read: list[str], unit: str, result: str) -> str:
     """SPICE2's order: 1, the quantities, products of two of them, of three ..."""
     if len(gains) == 1:
-        raise Unreadable("POLY with one number: a gain in SPICE2, a constant in ngspice; '0 GAIN' or no POLY is both's")
+        raise UnreadableCard(
+            "POLY with one number: a gain in SPICE2, a constant in ngspice; '0 GAIN' or no POLY is both's"
+        )
     terms, degree, at = [plain(gains[0])], 1, 1
     # all products of one degree before those of the next
     while at < len(gains):
@@ -75,10 +79,10 @@ def _polynomial(gains: list[float], read: list[str], unit: str, result: str) -> 
     return f"(1 {result})*({' + '.join(terms)})"
 
 
-def _through(scope: Scope, source: str) -> str:
+def _through(scope: CircuitScope, source: str) -> str:
     """The current of a source."""
     if source not in scope.name:
-        raise Unreadable(f"there is no source '{source}' here")
+        raise UnreadableCard(f"there is no source '{source}' here")
     return f"{scope.name[source]}.f"
 
 
@@ -86,14 +90,14 @@ def _factor(gain: float, unit: str) -> str:
     return plain(gain) if not unit and gain >= 0.0 else f"({quantity(gain, unit)})"
 
 
-def _between(scope: Scope, plus: str, minus: str) -> str:
+def _between(scope: CircuitScope, plus: str, minus: str) -> str:
     a, b = scope.node(plus), scope.node(minus)
     if b == "ground":
         return f"{a}.e" if a != "ground" else "(0 V)"
     return f"(-{b}.e)" if a == "ground" else f"({a}.e - {b}.e)"
 
 
-CONTROLLED: dict[str, Callable[[Card, Scope], Element]] = {
+CONTROLLED: dict[str, Callable[[Card, CircuitScope], DeviceText]] = {
     "e": controlled_source("effort", "e", "", by_current=False),
     "g": controlled_source("flow", "f", "S", by_current=False),
     "f": controlled_source("flow", "f", "", by_current=True),

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 from sysdyn.cli.run.many.in_core import InCore
 from sysdyn.cli.run.many.loaded import Loaded
-from sysdyn.cli.sweep.kept import Block
+from sysdyn.cli.sweep.kept import KeptRuns
 from sysdyn.dsl.model import expression as ex
 from sysdyn.dsl.text.diagnostics import ModelError, Report
 from sysdyn.runtime.accuracy.options import instants
@@ -60,7 +60,7 @@ class Cases:
         self._core.set_up(rows)
         self._extrema = keep != END
 
-    def run(self, numbers: Sequence[int], cases: Sequence[Mapping[str, Any]]) -> tuple[Block | None, list[int]]:
+    def run(self, numbers: Sequence[int], cases: Sequence[Mapping[str, Any]]) -> tuple[KeptRuns | None, list[int]]:
         """What is kept of the cases, and the places of those that need a run of their own."""
         values = np.array([[case[name] for name in self._names] for case in cases], dtype=np.float64)
         with ex.fresh(self._compiled.nodes):
@@ -76,7 +76,7 @@ class Cases:
         if not done.any():
             return None, left
         nothing = np.zeros((int(done.sum()), 0))
-        block = Block(
+        block = KeptRuns(
             np.asarray(numbers, dtype=np.int64)[place[done]],
             batch.columns,
             self._core.method,

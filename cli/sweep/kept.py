@@ -1,4 +1,4 @@
-"""What is kept of runs: one by one (`Kept`), or many that were met in arrays (`Block`); `Done` is all of a sweep."""
+"""What is kept of runs: one by one (`Kept`), or many that were met in arrays (`KeptRuns`); `Done` is all of a sweep."""
 
 from __future__ import annotations
 
@@ -41,7 +41,7 @@ class Kept:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Block:
+class KeptRuns:
     """What is kept of runs that were met, one after the other in the core.
 
     runs [k]: their numbers; names: of the traced quantities; estimate (relative), steps, cpu_s [k]; end, least, most
@@ -81,7 +81,7 @@ class Block:
         return found
 
     @classmethod
-    def from_json(cls, line: dict[str, Any]) -> Block:
+    def from_json(cls, line: dict[str, Any]) -> KeptRuns:
         """From a line of the journal."""
         found: dict[str, Any] = {
             name: _unpack(value) if isinstance(value, dict) else value for name, value in line.items()
@@ -99,7 +99,7 @@ def _unpack(item: dict[str, Any]) -> NDArray[Any]:
     return np.frombuffer(base64.b64decode(item["data"]), dtype=item["kind"]).reshape(item["shape"]).copy()
 
 
-Item = Kept | Block
+Item = Kept | KeptRuns
 
 
 @dataclass(slots=True)
@@ -107,7 +107,7 @@ class Done:
     """The runs of a sweep that are done: singles by number, and blocks."""
 
     singles: dict[int, Kept] = field(default_factory=dict)
-    blocks: list[Block] = field(default_factory=list)
+    blocks: list[KeptRuns] = field(default_factory=list)
     _place: dict[int, tuple[int, int]] = field(default_factory=dict)
 
     def take(self, item: Item) -> None:

@@ -16,25 +16,25 @@ from typing import Any
 
 from sysdyn import __version__
 from sysdyn.cli.run.request import lock
-from sysdyn.cli.run.request.asked import Request
+from sysdyn.cli.run.request.asked import RunRequest
 from sysdyn.cli.run.request.targets import Target
-from sysdyn.cli.trade.traded import Combination, Measured, Reference, Runs
+from sysdyn.cli.trade.traded import Combination, Measured, Runs, TradeReference
 from sysdyn.compiler.program import cache
 from sysdyn.runtime.trace.trace import Trace
 
 
-class Journal:
+class TradeJournal:
     """runs: what was measured before; reference: the trace and what is known of it, None where none was made yet."""
 
     def __init__(self, digest: str) -> None:
         self.folder = cache.folder() / "trades" / digest
         self.runs: Runs = {}
-        self.reference: tuple[Trace, Reference] | None = None
+        self.reference: tuple[Trace, TradeReference] | None = None
         for line in self._lines():
             with contextlib.suppress(ValueError, KeyError, TypeError):  # a line that a kill cut short
                 self._read(json.loads(line))
         with contextlib.suppress(OSError, ValueError, KeyError, TypeError):
-            known = Reference(**json.loads((self.folder / "reference.json").read_text(encoding="utf-8")))
+            known = TradeReference(**json.loads((self.folder / "reference.json").read_text(encoding="utf-8")))
             self.reference = Trace.open(self.folder / "reference.h5"), known
 
     def _lines(self) -> list[str]:
@@ -52,7 +52,7 @@ class Journal:
             **{**item, "combination": combination, "statistics": statistics}
         )
 
-    def refer(self, trace: Trace, known: Reference) -> None:
+    def refer(self, trace: Trace, known: TradeReference) -> None:
         """Keeps the reference; its description last, so that a kill leaves none by halves."""
         with contextlib.suppress(OSError):
             self.folder.mkdir(parents=True, exist_ok=True)
@@ -73,10 +73,10 @@ class Journal:
         shutil.rmtree(self.folder, ignore_errors=True)
 
 
-def journal(request: Request, target: Target) -> Journal | None:
+def journal(request: RunRequest, target: Target) -> TradeJournal | None:
     """That of a request; None of a text that stands in no file."""
     if request.file == "-":
         return None
     asked = asdict(replace(request, file=Path(request.file).name, output=None, timings=True, no_lock=True))
     said = {"version": __version__, "asked": asked, "files": lock.hashes(target)}
-    return Journal(hashlib.sha256(json.dumps(said, sort_keys=True, default=str).encode()).hexdigest()[:32])
+    return TradeJournal(hashlib.sha256(json.dumps(said, sort_keys=True, default=str).encode()).hexdigest()[:32])

@@ -57,7 +57,7 @@ class Climb:
 
 
 @dataclass(slots=True)
-class Search:
+class TradeSearch:
     """The measurements of one scene.  limit: monotonic instant at which it ends, None: none; flat: levels whose errors
     no tolerance changes any more.
     """

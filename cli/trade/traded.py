@@ -68,7 +68,7 @@ Runs = dict[tuple[Combination, float], Measured | str]
 
 
 @dataclass(frozen=True, slots=True)
-class Refusal:
+class RefusedCombination:
     """A formulation or combination that cannot be run, and why; finding: the reason with its code and place."""
 
     formulation: str
@@ -80,7 +80,7 @@ class Refusal:
 
 
 @dataclass(frozen=True, slots=True)
-class Reference:
+class TradeReference:
     """What errors are taken from.  first, second: its two runs; uncertainty: how far they are apart, relative;
     until [s]: up to where they agree within a tenth of the accuracy.
     """
@@ -101,9 +101,9 @@ class Traded:
     accuracy: float
     span: tuple[float, float]
     measured: tuple[Measured, ...]
-    refusals: tuple[Refusal, ...]
+    refusals: tuple[RefusedCombination, ...]
     dropped: tuple[tuple[Combination, str], ...]
-    reference: Reference
+    reference: TradeReference
     judged: tuple[str, ...]
     ended: bool
 

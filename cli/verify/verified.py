@@ -12,14 +12,14 @@ from typing import Any
 import numpy as np
 from sysdyn.cli.verify.agreement import Bounds, Gap, gaps
 from sysdyn.cli.verify.twins import Twins
-from sysdyn.runtime.judgement import NotMet
+from sysdyn.runtime.judgement import Shortfall
 from sysdyn.runtime.simulate import Outcome
 from sysdyn.runtime.trace.trace import Trace
 from sysdyn.values import dataclass
 
 
 @dataclass(frozen=True, slots=True)
-class Run:
+class VerifiedRun:
     """One run of the scene.
 
     accuracy: as asked; expects: text, and whether it held; failure: where it stopped.
@@ -52,7 +52,7 @@ class Run:
         return judgement is not None and any(m.what == "accuracy" for m in judgement.not_met)
 
     @property
-    def unbalanced(self) -> tuple[NotMet, ...]:
+    def unbalanced(self) -> tuple[Shortfall, ...]:
         """Ledgers of energy and invariants that are off."""
         judgement = self.outcome.judgement
         return () if judgement is None else tuple(m for m in judgement.not_met if m.what != "accuracy")
@@ -64,7 +64,7 @@ class Run:
 
 
 @dataclass(frozen=True, slots=True)
-class Refusal:
+class RefusedFormulation:
     """A formulation that cannot express the model: the code and its reason."""
 
     formulation: str
@@ -76,12 +76,12 @@ class Refusal:
 class Disagreement:
     """Two runs that differ, and where most."""
 
-    one: Run
-    other: Run
+    one: VerifiedRun
+    other: VerifiedRun
     gap: Gap
 
     @property
-    def doubted(self) -> tuple[Run, ...]:
+    def doubted(self) -> tuple[VerifiedRun, ...]:
         """Those of the two that say themselves that they have not reached their accuracy: no witnesses."""
         return tuple(run for run in (self.one, self.other) if run.inaccurate)
 
@@ -98,10 +98,10 @@ class Verified:
 
     name: str
     span: tuple[float, float]
-    runs: tuple[Run, ...]
-    finer: Run
+    runs: tuple[VerifiedRun, ...]
+    finer: VerifiedRun
     worst: tuple[Gap | None, ...]
-    refusals: tuple[Refusal, ...]
+    refusals: tuple[RefusedFormulation, ...]
     twins: tuple[Twins, ...]
     horizon: float
     beyond: Gap | None
@@ -109,21 +109,21 @@ class Verified:
     compared: tuple[str, ...]
     left_out: tuple[tuple[str, str], ...]
     disagreements: tuple[Disagreement, ...]
-    starts: tuple[tuple[Run, Gap], ...] = ()
+    starts: tuple[tuple[VerifiedRun, Gap], ...] = ()
     interrupted: bool = False
 
     @property
-    def apart(self) -> tuple[tuple[Run, Gap], ...]:
+    def apart(self) -> tuple[tuple[VerifiedRun, Gap], ...]:
         """Formulations that begin elsewhere than the reference."""
         return tuple((run, gap) for run, gap in self.starts if gap.ratio > 1.0)
 
     @property
-    def failures(self) -> tuple[Run, ...]:
+    def failures(self) -> tuple[VerifiedRun, ...]:
         """Runs that stopped early: the solver could not finish them, or a limit came first."""
         return tuple(run for run in (*self.runs, self.finer) if run.failure)
 
 
-def worst(reference: Run, run: Run, bounds: Bounds, until: float) -> Gap | None:
+def worst(reference: VerifiedRun, run: VerifiedRun, bounds: Bounds, until: float) -> Gap | None:
     """The worst gap of a run to the reference; None of the reference itself, where nothing is compared, and where one
     of the two stopped early.
     """
@@ -132,7 +132,7 @@ def worst(reference: Run, run: Run, bounds: Bounds, until: float) -> Gap | None:
     return next(iter(gaps(reference.trace, run.trace, bounds, until)), None)
 
 
-def disagreements(runs: Sequence[Run], bounds: Bounds, until: float) -> tuple[Disagreement, ...]:
+def disagreements(runs: Sequence[VerifiedRun], bounds: Bounds, until: float) -> tuple[Disagreement, ...]:
     """Runs that differ from the first up to `until` [s], then pairs among those that do not.
 
     A first run that is not met by its own estimate judges no other; one that stopped early neither judges nor is

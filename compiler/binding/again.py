@@ -40,7 +40,7 @@ class Constants:
 
 
 @dataclass(frozen=True, slots=True)
-class Way:
+class Consequences:
     """What follows from a set of scalar parameters.
 
     follow: parameters with the nodes of their formulas, each after those it needs; slopes; initial values, by their
@@ -62,7 +62,7 @@ def way(
     program: Program,
     binding: Binding,
     names: frozenset[str],
-) -> Way | None:
+) -> Consequences | None:
     """What follows from these parameters; None where more than numbers does."""
     known = {p.name: p for p in network.parameters}
     # a name that is no parameter of the network
@@ -98,7 +98,7 @@ def way(
     constants = Constants(form, *places_of(network, form, program, binding)) if form.offsets and move else None
     lookup = binding.parameters.lookup
     places = tuple((name, place) for place, name in enumerate(program.scalars) if name in moving)
-    return Way(
+    return Consequences(
         tuple((n, _nodes(known[n].values[0])) for n in behind),
         tuple((slope, _nodes(slope.expression), grid(slope.loops, lookup)) for slope in slopes),
         tuple((k, _nodes(pin.value), grid(pin.nest, lookup)) for k, pin in pins),
@@ -111,13 +111,13 @@ def _nodes(root: Node) -> Nodes:
     return tuple(topological_unbound([root]))
 
 
-def again(binding: Binding, path: Way, overrides: Mapping[str, float]) -> Binding | None:
+def again(binding: Binding, path: Consequences, overrides: Mapping[str, float]) -> Binding | None:
     """The binding with these values, whose names are those that the way was made for."""
     with np.errstate(all="ignore"):
         return _again(binding, path, overrides)
 
 
-def _again(binding: Binding, path: Way, overrides: Mapping[str, float]) -> Binding | None:
+def _again(binding: Binding, path: Consequences, overrides: Mapping[str, float]) -> Binding | None:
     """Bind anew by the formulas of `path` alone; None where a value is not finite or a decision of the first binding
     fails.
     """

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 from sysdyn.compiler.binding.binding import Binding
 from sysdyn.compiler.binding.places import starts
-from sysdyn.compiler.forms.descriptor import Block, DescriptorForm, Kernel
+from sysdyn.compiler.forms.descriptor import Block, DescriptorForm, LoopKernel
 from sysdyn.compiler.model.interpret import Value, evaluate, grid
 from sysdyn.compiler.model.magnitudes import magnitudes
 from sysdyn.compiler.model.parameters import Extents, positions
@@ -73,7 +73,7 @@ class SampledRows:
             self._add(kernel, columns, rows, kept, points, sample, careful)
         return sample
 
-    def _places(self, kernel: Kernel) -> tuple[dict[str, Array], list[Whole]]:
+    def _places(self, kernel: LoopKernel) -> tuple[dict[str, Array], list[Whole]]:
         """Loop variables over all iterations, and the row of each summand there."""
         columns = grid(kernel.nest, self.binding.parameters.lookup)
         count = len(next(iter(columns.values()))) if columns else 1
@@ -109,7 +109,7 @@ class SampledRows:
 
     def _add(
         self,
-        kernel: Kernel,
+        kernel: LoopKernel,
         columns: dict[str, Array],
         rows: list[Whole],
         kept: NDArray[np.bool_],

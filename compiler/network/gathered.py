@@ -14,11 +14,11 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
 
-from sysdyn.compiler.network.neighbourhoods import MARK, RUN, Found, Run, Site, laws_of, side_by_side
+from sysdyn.compiler.network.neighbourhoods import MARK, RUN, BranchSequence, Found, Site, laws_of, side_by_side
 from sysdyn.compiler.network.skeleton import Shaped, fill_shape, shape_of
 from sysdyn.compiler.network.strands import in_strands
 from sysdyn.dsl.model.expression import Node, add, const, index, param, substitute, var, variables
-from sysdyn.dsl.model.network import Branch, Initial, Loop, Network, NodeFamily, Parameter, Terminal
+from sysdyn.dsl.model.network import Branch, InitialCondition, Loop, Network, NodeFamily, Parameter, Terminal
 from sysdyn.dsl.model.rewriting import rewritten
 from sysdyn.dsl.model.units import Unit, si
 from sysdyn.dsl.text.diagnostics import Place
@@ -58,7 +58,7 @@ def _count_remaining(network: Network, found: Found) -> int:
 class _Families:
     """The network under way; sites: of the nodes that stand in families."""
 
-    def __init__(self, network: Network, sites: dict[str, Site], runs: Sequence[Run]) -> None:
+    def __init__(self, network: Network, sites: dict[str, Site], runs: Sequence[BranchSequence]) -> None:
         self.whole, self.sites, self.runs = network, sites, runs
         self.names: dict[str, list[str]] = {}
         for name, (family, _) in sites.items():
@@ -104,7 +104,7 @@ class _Families:
         name, k = self.at[end.node]
         return Terminal(name, (const(k),))
 
-    def _branch(self, run: Run) -> Branch:
+    def _branch(self, run: BranchSequence) -> Branch:
         """A run as one statement in a loop."""
         head, shape = run.members[0]
         name, k, last = head.name + MARK, index(_INDEX), const(len(run.members) - 1)
@@ -158,9 +158,9 @@ class _Families:
                 change[n] = var(family, n.data[1], const(k), order=n.data[2])
         return substitute(root, change) if change else root
 
-    def _initials(self, initials: Sequence[Initial]) -> Iterator[Initial]:
+    def _initials(self, initials: Sequence[InitialCondition]) -> Iterator[InitialCondition]:
         """Initial values of neighbours that are said alike as one statement in a loop, in the place of the first."""
-        groups: dict[tuple[object, ...], list[tuple[int, Initial, Shaped]]] = {}
+        groups: dict[tuple[object, ...], list[tuple[int, InitialCondition, Shaped]]] = {}
         # statements that differ by the element and numbers alone
         for i in initials:
             target, store = i.target, self.at.get(i.store, (i.store, 0))[0]
@@ -168,7 +168,7 @@ class _Families:
             if shape is not None and not i.loops:
                 key = (target.data, i.fixed, store, i.unit, i.depth, i.said, shape.key)
                 groups.setdefault(key, []).append((int(target.args[0].data), i, shape))
-        alike: dict[int, list[tuple[int, Initial, Shaped]]] = {}
+        alike: dict[int, list[tuple[int, InitialCondition, Shaped]]] = {}
         # a run of neighbours, long enough
         for found in groups.values():
             places = [k for k, _, _ in found]
@@ -181,7 +181,7 @@ class _Families:
             elif alike[id(i)]:
                 yield self._gather_initials(alike[id(i)])
 
-    def _gather_initials(self, found: Sequence[tuple[int, Initial, Shaped]]) -> Initial:
+    def _gather_initials(self, found: Sequence[tuple[int, InitialCondition, Shaped]]) -> InitialCondition:
         first, head, shape = found[0]
         (name, kind, order), k = head.target.data, index(_INDEX)
         value = fill_shape(shape, "", (), self._numbers(name, [s.holes for _, _, s in found], head.place))

@@ -21,7 +21,7 @@ from sysdyn.compiler.model.terms import summands, vanishes
 from sysdyn.dsl.model import expression as ex
 from sysdyn.dsl.model.calculus import derivative
 from sysdyn.dsl.model.expression import Node
-from sysdyn.dsl.model.network import Branch, Domain, Energy, Network, Terminal, loop_indices
+from sysdyn.dsl.model.network import Branch, Domain, EnergyTerm, Network, Terminal, loop_indices
 from sysdyn.dsl.model.paynter import STATE_FUNCTIONS, StateFunction
 
 ALL = frozenset(STATE_FUNCTIONS)
@@ -82,7 +82,7 @@ def _ends(on: Node) -> tuple[Terminal, Terminal] | None:
     return (ends[-1.0], ends[1.0]) if points and ex.is_const(whole, 0.0) else None
 
 
-def element(energy: Energy, piece: Node, name: str, nodes: dict[str, Domain]) -> Branch | None:
+def element(energy: EnergyTerm, piece: Node, name: str, nodes: dict[str, Domain]) -> Branch | None:
     """The branch whose law is the slope of an energy over u = x(a) - x(b), or None."""
     function = STATE_FUNCTIONS[energy.function]
     used = sorted(
@@ -131,7 +131,7 @@ def _on_branches(network: Network, functions: frozenset[str]) -> Network:
     )
 
 
-def _is_store(energy: Energy) -> bool:
+def _is_store(energy: EnergyTerm) -> bool:
     return STATE_FUNCTIONS[energy.function].edge != "dissipator"
 
 
@@ -140,7 +140,7 @@ def _is_parameter(node: Node, function: StateFunction) -> bool:
     return node.data[1] == "s" or (node.data[1] == "e" and function.edge == "dissipator")
 
 
-def _owners(energy: Energy) -> list[str]:
+def _owners(energy: EnergyTerm) -> list[str]:
     """The branches that an energy reads."""
     return list(dict.fromkeys(n.data[0] for n in _read(energy.expression)))
 
@@ -163,7 +163,7 @@ def _statements(network: Network, fields: dict[str, Branch]) -> dict[str, set[st
     return said
 
 
-def _over_fields(energy: Energy, fields: dict[str, Branch], said: dict[str, set[str]]) -> bool:
+def _over_fields(energy: EnergyTerm, fields: dict[str, Branch], said: dict[str, set[str]]) -> bool:
     """Whether an energy is a function of own variables of branches without a law, each at its own indices."""
     function = STATE_FUNCTIONS[energy.function]
     unknowns = [n for n in ex.variables(energy.expression) if n.op == "var" and not _is_parameter(n, function)]
@@ -175,8 +175,8 @@ def _over_fields(energy: Energy, fields: dict[str, Branch], said: dict[str, set[
 
 
 def _closed_statements(
-    network: Network, chosen: Iterable[Energy], fields: dict[str, Branch], said: dict[str, set[str]]
-) -> list[Energy]:
+    network: Network, chosen: Iterable[EnergyTerm], fields: dict[str, Branch], said: dict[str, set[str]]
+) -> list[EnergyTerm]:
     """Statements all of whose branches stand in such statements only."""
     kept, written = list(chosen), Counter(n for e in network.energies for n in _owners(e))
     while True:
@@ -188,9 +188,9 @@ def _closed_statements(
         kept = rest
 
 
-def _merge_by_branches(energies: Iterable[Energy]) -> list[Energy]:
+def _merge_by_branches(energies: Iterable[EnergyTerm]) -> list[EnergyTerm]:
     """Those that share branches as one sum each: what these hold is its transform."""
-    found: list[Energy] = []
+    found: list[EnergyTerm] = []
     for e in energies:
         shared = [other for other in found if set(_owners(other)) & set(_owners(e))]
         whole = replace(e, expression=ex.add(*(other.expression for other in shared), e.expression))
@@ -198,7 +198,7 @@ def _merge_by_branches(energies: Iterable[Energy]) -> list[Energy]:
     return found
 
 
-def _with_law(branch: Branch, energies: list[Energy]) -> Branch:
+def _with_law(branch: Branch, energies: list[EnergyTerm]) -> Branch:
     """The branch with the slope of its energies as law."""
     function = STATE_FUNCTIONS[energies[0].function]
     own = ex.var(branch.name, f"b{function.own}", *branch.at)
@@ -208,7 +208,7 @@ def _with_law(branch: Branch, energies: list[Energy]) -> Branch:
     return replace(branch, kind=function.edge, side=function.conjugate, law=law, stated=stated, energy=energy)
 
 
-def _stored_function(energy: Energy) -> Energy:
+def _stored_function(energy: EnergyTerm) -> EnergyTerm:
     """What stores of several branches hold: T or V, also where their transform is written."""
     function = STATE_FUNCTIONS[energy.function]
     held = energy.expression

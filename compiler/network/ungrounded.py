@@ -9,8 +9,8 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import replace
 
-from sysdyn.compiler.network.primal.balances import ZERO, Effort, balances
-from sysdyn.compiler.network.primal.bounds import Sizes, parts
+from sysdyn.compiler.network.primal.balances import ZERO, NodeEffort, balances
+from sysdyn.compiler.network.primal.bounds import WholeNumbers, parts
 from sysdyn.compiler.network.primal.incidence import Incidence, ground, indices, loops_over
 from sysdyn.compiler.network.primal.series import series
 from sysdyn.dsl.model.expression import var
@@ -23,7 +23,7 @@ def add_references(network: Network) -> Network:
     if all(n.domain.common == "flow" for n in network.nodes):
         return network
     try:
-        incidence = Incidence(network, Sizes(network))
+        incidence = Incidence(network, WholeNumbers(network))
         found = balances(incidence, series(incidence, network.read).merged).efforts
     except ModelError:  # a pattern of the primal family alone: it says so there
         return network
@@ -31,7 +31,7 @@ def add_references(network: Network) -> Network:
     return replace(network, constraints=(*network.constraints, *_constraints(free)))
 
 
-def _constraints(free: list[Effort]) -> Iterator[Constraint]:
+def _constraints(free: list[NodeEffort]) -> Iterator[Constraint]:
     labels = parts([(f"{e.node}.reference", e.box) for e in free])
     for effort, label in zip(free, labels, strict=True):
         at, box = indices(effort.box), effort.box

@@ -12,7 +12,7 @@ import re
 from collections import Counter
 from collections.abc import Iterable, Sequence
 
-from sysdyn.compiler.program.program import Assign, Fold, Operand, Routine, Statement, Store
+from sysdyn.compiler.program.program import Assign, Fold, Operand, Routine, Statement, StoreInstruction
 from sysdyn.values import dataclass
 
 LARGE = 256
@@ -32,7 +32,7 @@ _CHEAP = frozenset(("y", "yd", "p", "element", "time", "index", "sum", "mul"))
 
 
 @dataclass(frozen=True, slots=True)
-class Group:
+class AlikeTexts:
     """Texts that are alike: text, with n[column] and d[column] for what differs; whole and real: their rows."""
 
     text: str
@@ -42,14 +42,14 @@ class Group:
 
 
 @dataclass(frozen=True, slots=True)
-class Sum:
+class LongSum:
     """An output that is a long sum: constant, terms with their coefficients (the value of a term is the last that its
     statements make), and where it is stored; value -1 stands for the sum.
     """
 
     constant: float
     terms: tuple[tuple[float, tuple[Statement, ...]], ...]
-    store: Store
+    store: StoreInstruction
 
 
 def skeleton(text: str, *, whole: bool = False) -> tuple[str, tuple[str, ...]]:
@@ -66,7 +66,7 @@ def normalize_signs(text: str) -> str:
     return _LATER.sub(lambda found: f" + ({'-' if found[1] == '-' else ''}{found[2] or '1.0'})*", text)
 
 
-def group(key: str, rows: Sequence[tuple[str, ...]]) -> Group:
+def group(key: str, rows: Sequence[tuple[str, ...]]) -> AlikeTexts:
     """One text for all rows of numbers that stand in this skeleton."""
     columns: dict[tuple[str, ...], str] = {}
     found: dict[str, list[tuple[str, ...]]] = {"n": [], "d": []}
@@ -81,7 +81,7 @@ def group(key: str, rows: Sequence[tuple[str, ...]]) -> Group:
                 found[kind].append(column)
         text += columns[column], piece
     whole, real = (tuple(zip(*found[kind], strict=True)) for kind in "nd")
-    return Group("".join(text), len(rows), whole, real)
+    return AlikeTexts("".join(text), len(rows), whole, real)
 
 
 def split_outputs(routine: Routine) -> list[tuple[Statement, ...]] | None:
@@ -91,18 +91,18 @@ def split_outputs(routine: Routine) -> list[tuple[Statement, ...]] | None:
     if routine.loops or any(isinstance(s, Fold) for s in routine.body):
         return None
     made = {s.target: s for s in routine.body if isinstance(s, Assign)}
-    outputs = [(s, _needed_assignments([s.value], made)) for s in routine.body if isinstance(s, Store)]
+    outputs = [(s, _needed_assignments([s.value], made)) for s in routine.body if isinstance(s, StoreInstruction)]
     uses = Counter(target for _, needed in outputs for target in needed)
     if any(count > 1 and made[target].op not in _CHEAP for target, count in uses.items()):
         return None
     return [(*_renumber(needed, made), _store(s, needed)) for s, needed in outputs]
 
 
-def as_long_sum(output: Sequence[Statement]) -> Sum | None:
+def as_long_sum(output: Sequence[Statement]) -> LongSum | None:
     """An output as a long sum; None where it is none, or terms share more than sums and products."""
     store = output[-1]
     made = {s.target: s for s in output if isinstance(s, Assign)}
-    assert isinstance(store, Store)
+    assert isinstance(store, StoreInstruction)
     total = made.get(store.value) if isinstance(store.value, int) else None
     if total is None or total.op != "sum" or len(total.args) < TERMS:
         return None
@@ -112,12 +112,12 @@ def as_long_sum(output: Sequence[Statement]) -> Sum | None:
         return None
     constant, coefficients = total.data
     terms = tuple((c, _renumber(needed, made)) for c, needed in zip(coefficients, needs, strict=True))
-    return Sum(constant, terms, Store(store.place, -1))
+    return LongSum(constant, terms, StoreInstruction(store.place, -1))
 
 
 def repeated_places(routines: Iterable[Routine]) -> set[object]:
     """Places to which the routines add more than once: the order of these sums is kept."""
-    places = Counter(s.place for r in routines for s in r.body if isinstance(s, Store))
+    places = Counter(s.place for r in routines for s in r.body if isinstance(s, StoreInstruction))
     return {place for place, count in places.items() if count > 1}
 
 
@@ -145,5 +145,5 @@ def _renumber(needed: dict[int, int], made: dict[int, Assign]) -> tuple[Assign, 
     return tuple(found)
 
 
-def _store(s: Store, needed: dict[int, int]) -> Store:
-    return Store(s.place, needed[s.value] if isinstance(s.value, int) else s.value)
+def _store(s: StoreInstruction, needed: dict[int, int]) -> StoreInstruction:
+    return StoreInstruction(s.place, needed[s.value] if isinstance(s.value, int) else s.value)

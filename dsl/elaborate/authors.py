@@ -48,12 +48,12 @@ def _contains(elaborator: Elaborator, space: Space, place: Place) -> bool:
 def _author(elaborator: Elaborator, space: Space) -> Place | None:
     """The statement in the author's file that a space comes from."""
     labels = [label.partition("[")[0] for label in space.path.split(".")]
-    inner: syntax.Instance | None = None
+    inner: syntax.InstanceStatement | None = None
     for depth, label in enumerate(labels):
         around = ".".join(labels[:depth])
         for outer, body in elaborator.bodies:
             if outer.source is elaborator.source and without_indices(outer.path) == around:
-                made = [s for s, _ in body if isinstance(s, syntax.Instance) and s.decl.name == label]
+                made = [s for s, _ in body if isinstance(s, syntax.InstanceStatement) and s.decl.name == label]
                 inner = made[0] if made else inner
     return None if inner is None else Place(elaborator.source, inner.span)
 

@@ -21,7 +21,7 @@ from sysdyn.dsl.elaborate.instances.port_efforts import NotSaidError, conjugate_
 from sysdyn.dsl.elaborate.parts import flatten
 from sysdyn.dsl.elaborate.statements.statements import STATEMENTS
 from sysdyn.dsl.model import expression as ex
-from sysdyn.dsl.model.network import Branch, Derived, Dynamic, Initial, Loop, Observation, State, loop_indices
+from sysdyn.dsl.model.network import Branch, Derived, Dynamic, InitialCondition, Loop, Observation, State, loop_indices
 from sysdyn.dsl.model.rewriting import expressions
 from sysdyn.dsl.model.units import Dimension, si
 from sysdyn.dsl.names.failures import Failed, NotYetError, SeveralError
@@ -29,20 +29,26 @@ from sysdyn.dsl.names.symbols import Definition, End, Scope, Space, Typed
 from sysdyn.dsl.text.diagnostics import Place, Related, Report
 from sysdyn.dsl.tree import syntax
 
-_ALONE = (syntax.Input, syntax.Port, syntax.Branch, syntax.Law, syntax.Level)
+_ALONE = (
+    syntax.InputStatement,
+    syntax.PortStatement,
+    syntax.BranchStatement,
+    syntax.LawStatement,
+    syntax.LevelStatement,
+)
 """Statements that a model reads otherwise than a component does, or refuses."""
 _STATED = tuple(STATEMENTS)
 """Statements that make equations, in the order in which they are resolved."""
 
 
-_MOVING = (syntax.Energy, syntax.Content, syntax.Work, syntax.Dynamic)
+_MOVING = (syntax.EnergyStatement, syntax.ContentStatement, syntax.WorkStatement, syntax.DynamicStatement)
 """Those that move something: what they differentiate must not jump."""
 
 
 class Elaborator(Instances):
     """Elaborates one model of a file."""
 
-    def __init__(self, files: FileScope, model: syntax.Model, report: Report) -> None:
+    def __init__(self, files: FileScope, model: syntax.ModelDefinition, report: Report) -> None:
         super().__init__(report)
         self.files = files
         self.model = model
@@ -55,8 +61,8 @@ class Elaborator(Instances):
     def names(self) -> None:
         """Bring the model's names into scope; values of inputs may change until `elements`."""
         with self.entering(self.space):
-            for statement, _ in self._body.statements_of(syntax.Broken):
-                assert isinstance(statement, syntax.Broken)
+            for statement, _ in self._body.statements_of(syntax.BrokenStatement):
+                assert isinstance(statement, syntax.BrokenStatement)
                 self.scope.broken |= statement.names
             self.declare_parameters(self._body, {})
             self.declare_all(self._body, self._declare_statement, _ALONE)
@@ -66,17 +72,17 @@ class Elaborator(Instances):
         """Statements that stand in components alone are refused in a model; the others declared."""
         match statement:
             # `input u: N` of a model: what drives it from outside
-            case syntax.Input():
+            case syntax.InputStatement():
                 self.model_input(statement)
             # of components alone: whatever is outside connects to them, and outside of a model there is nothing
-            case syntax.Port() | syntax.Branch():
-                what = "port" if isinstance(statement, syntax.Port) else "branch"
+            case syntax.PortStatement() | syntax.BranchStatement():
+                what = "port" if isinstance(statement, syntax.PortStatement) else "branch"
                 message = f"a model has no {what}: nothing could be connected to it"
                 raise self.resolver.fail("E408", message, statement.span, help="node, or a component")
             # `e = R*f` needs the branch of a component whose law it is
-            case syntax.Law():
+            case syntax.LawStatement():
                 raise self.resolver.fail("E303", "a law stands in a component with a branch", statement.span)
-            case syntax.Level():
+            case syntax.LevelStatement():
                 raise self.resolver.fail("E803", "levels belong to components", statement.span)
             # param, coord, node, let, ...: in models as in components
             case _:
@@ -86,7 +92,7 @@ class Elaborator(Instances):
         """Elaborate the model's instances and those inside them; their laws follow once sizes are set (`settle`)."""
         with self.entering(self.space):
             self.announce(self._body)
-        self._carry_out(syntax.Law, self.law)
+        self._carry_out(syntax.LawStatement, self.law)
 
     def settle(self) -> None:
         """The laws of all branches."""
@@ -114,7 +120,7 @@ class Elaborator(Instances):
     def statements(self) -> None:
         """Resolve what the model and its instances say: constraints first, which others may read."""
         self.resolver.complete = True
-        self._carry_out(syntax.Constraint, self.constraint)
+        self._carry_out(syntax.ConstraintStatement, self.constraint)
         self.run_postponed()
         for space, body in self.bodies:
             if isinstance(space, Likeness):
@@ -156,7 +162,7 @@ class Elaborator(Instances):
             self.parts.dynamics.append(Dynamic(state, self._by_nodes(power), loops, found.place))
             self.parts.given.add(name)
             target = state if found.first is None else ex.sub(state, found.first)
-            self.parts.initials.append(Initial(target, ex.const(0.0), True, loops, found.place))
+            self.parts.initials.append(InitialCondition(target, ex.const(0.0), True, loops, found.place))
 
     def _by_nodes(self, power: ex.Node) -> ex.Node:
         """A power with the efforts of branches without a law (coils on one core) by their nodes: what makes them, the

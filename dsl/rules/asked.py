@@ -40,7 +40,7 @@ class Bound:
 
 
 @dataclass(frozen=True, slots=True)
-class Conditions:
+class ParameterConditions:
     """Those on some parameters: that compare one of them with a number, others under loops, laws of dissipators."""
 
     bounds: tuple[Bound, ...]
@@ -53,7 +53,7 @@ class Conditions:
         return not self.others and not self.laws
 
 
-class Asked:
+class TextConditions:
     """The conditions of one text; within the space of expressions in which it was made."""
 
     def __init__(self, model: Elaborator, elements: Sequence[ElementSetting]) -> None:
@@ -78,7 +78,7 @@ class Asked:
         # nonlinear dissipators are judged by samples
         bent = (b for b in model.parts.branches if b.kind == "dissipator" and not b.domain.pseudo)
         self._laws = [(b, self._read(b.law, b.loops)) for b in bent if b.law is not None and modulus(b) is None]
-        self._of: dict[frozenset[str], Conditions] = {}
+        self._of: dict[frozenset[str], ParameterConditions] = {}
 
     def _read(self, condition: Node, loops: Iterable[Loop]) -> frozenset[str]:
         """Parameters that a condition reads, and those that they follow from."""
@@ -90,14 +90,14 @@ class Asked:
             waiting = [v for name in new if (p := self._parameters.get(name)) is not None for v in p.values]
         return frozenset(found)
 
-    def conditions_of(self, names: frozenset[str]) -> Conditions:
+    def conditions_of(self, names: frozenset[str]) -> ParameterConditions:
         """The conditions on these parameters."""
         if names not in self._of:
             mine = [(c, loops) for c, loops, read in self._conditions if read & names]
             bounds = {c: b for c, _ in mine if (b := self._bound(c, names)) is not None}
             others = tuple(one for one in mine if one[0] not in bounds)
             laws = tuple(b for b, read in self._laws if read & names)
-            self._of[names] = Conditions(tuple(bounds.values()), others, laws)
+            self._of[names] = ParameterConditions(tuple(bounds.values()), others, laws)
         return self._of[names]
 
     def _bound(self, condition: Node, names: frozenset[str]) -> Bound | None:

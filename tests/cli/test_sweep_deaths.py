@@ -16,7 +16,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 from sysdyn.api import load
-from sysdyn.cli.run.request.asked import Request
+from sysdyn.cli.run.request.asked import RunRequest
 from sysdyn.cli.sweep import workers
 from sysdyn.cli.sweep.kept import Kept
 from sysdyn.cli.sweep.one_run import Runner
@@ -46,7 +46,7 @@ scene s of fall {
 def fall(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     Path("fall.sd").write_text(FALL)
-    return Request(str(tmp_path / "fall.sd"))
+    return RunRequest(str(tmp_path / "fall.sd"))
 
 
 def tasks():

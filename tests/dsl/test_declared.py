@@ -9,14 +9,14 @@ from sysdyn.dsl.elaborate.files import FileScope
 from sysdyn.dsl.elaborate.instances.casts import cast_of
 from sysdyn.dsl.elaborate.instances.elements import Elements
 from sysdyn.dsl.elaborate.statements.declarations import DECLARED, Declarations
-from sysdyn.dsl.elaborate.statements.parameters import Parameters
+from sysdyn.dsl.elaborate.statements.parameters import ParameterDeclarations
 from sysdyn.dsl.model import dimensions as dim
 from sysdyn.dsl.model import expression as ex
 from sysdyn.dsl.model.evaluation import evaluate
 from sysdyn.dsl.model.values import Values
 from sysdyn.dsl.names.failures import Failed
 from sysdyn.dsl.names.paths import Paths
-from sysdyn.dsl.names.quantities import BRANCH, Quantities, branch_words
+from sysdyn.dsl.names.quantities import BRANCH, QuantityResolver, branch_words
 from sysdyn.dsl.text.diagnostics import Report
 from sysdyn.dsl.text.source import SourceText
 
@@ -62,7 +62,7 @@ def parameter(text, name="a"):
     ],
 )
 def test_a_parameter_is_held_in_si_units(text, values, unit):
-    assert issubclass(Elaborator, Parameters)
+    assert issubclass(Elaborator, ParameterDeclarations)
     assert parameter(text) == (pytest.approx(values, rel=1e-15), unit)
 
 
@@ -289,8 +289,8 @@ def read(expression):
     """An expression's node where the cells are in sight (None where it is refused), the elaborator, what it is told."""
     text = CELLS.replace("LINE", f"let y = {expression}")
     elaborator, said = made(text)
-    assert issubclass(Quantities, Paths)
-    assert isinstance(elaborator.resolver, Quantities)
+    assert issubclass(QuantityResolver, Paths)
+    assert isinstance(elaborator.resolver, QuantityResolver)
     elaborator.resolver.report = report = Report()
     node, space, names = None, elaborator.space, elaborator.resolver
     with suppress(Failed), elaborator.entering(space), names.entering_scope(space.scope, elaborator.source):

@@ -9,12 +9,12 @@ from sysdyn.dsl import load
 from sysdyn.dsl.model import dimensions as dim
 from sysdyn.dsl.model import expression as ex
 from sysdyn.dsl.model.evaluation import evaluate
-from sysdyn.dsl.model.network import Energy
+from sysdyn.dsl.model.network import EnergyTerm
 from sysdyn.dsl.model.units import NONE
 from sysdyn.dsl.model.values import Values
 from sysdyn.dsl.names.failures import Failed
 from sysdyn.dsl.names.members import Members
-from sysdyn.dsl.names.names import STATICS, Names, pick
+from sysdyn.dsl.names.names import STATICS, NameResolver, pick
 from sysdyn.dsl.names.quantities import OF_ELEMENTS
 from sysdyn.dsl.names.reactions import ledger, reaction
 from sysdyn.dsl.names.symbols import Typed, Vector
@@ -134,7 +134,7 @@ def read(fresh):
 )
 def test_what_a_name_stands_for(read, text, value, unit):
     assert isinstance(read.context, Members)
-    assert isinstance(read.context, Names)
+    assert isinstance(read.context, NameResolver)
     found = read(text)
     assert found[1] == unit
     assert sorted(found[0].replace(" - ", " + -").split(" + ")) == sorted(value.replace(" - ", " + -").split(" + "))
@@ -289,7 +289,7 @@ def test_notes_on_loops_of_stores_wait_until_laws_are_right():
     text = f"model m {{\n  node a: electrical\n  A: {store}\n  B: {store}\n  R: dissipator(e = 1 ohm*f) a -> ground\n"
     network, _ = of_text(text + "}\n")
     assert told_of(network) == ["N401"]
-    twice = Energy("V", ex.div(ex.power(ex.var("A", "bq"), ex.const(2.0)), ex.const(2.0)), (), network.place)
+    twice = EnergyTerm("V", ex.div(ex.power(ex.var("A", "bq"), ex.const(2.0)), ex.const(2.0)), (), network.place)
     assert told_of(replace(network, energies=(twice,))) == ["E311"]
 
 

@@ -8,7 +8,7 @@ from sysdyn.dsl.parser.grammar import load_tables
 from sysdyn.dsl.parser.parse import parse
 from sysdyn.dsl.text.codes import codes
 from sysdyn.dsl.text.source import SourceText
-from sysdyn.dsl.tree.syntax import Broken
+from sysdyn.dsl.tree.syntax import BrokenStatement
 
 SYNTAX = [f"E{number}" for number in range(107, 119)] + ["E308"]
 
@@ -198,7 +198,7 @@ def test_a_faulty_head_does_not_hide_its_block():
     ]
     model = parse(SourceText("t", text))[0].items[0]
     assert model.name.name == "a"
-    assert isinstance(model.body[1], Broken)
+    assert isinstance(model.body[1], BrokenStatement)
 
 
 def test_a_broken_statement_tells_its_names():

@@ -15,7 +15,7 @@ from catalogue import network, state
 from reference_values import load
 from sysdyn.cli.run.generated import module_of
 from sysdyn.cli.run.prepare import Prepared
-from sysdyn.cli.run.request.asked import Request as Simulation
+from sysdyn.cli.run.request.asked import RunRequest as Simulation
 from sysdyn.cli.run.running import run
 from sysdyn.compiler.pipeline import compile_network
 from sysdyn.dsl.model import expression as x

@@ -8,7 +8,7 @@ from typing import Any
 import click
 from sysdyn.cli.console import Console, with_console
 from sysdyn.cli.options import chosen
-from sysdyn.cli.run.request.asked import Request
+from sysdyn.cli.run.request.asked import RunRequest
 
 FORMS = ("descriptor", "matrices", "canonical", "underlying", "linear", "port_hamiltonian", "efforts", "elements")
 
@@ -38,7 +38,7 @@ def command(console: Console, form: str, alphabet: str, no_prune: bool, index: s
     from sysdyn.dsl.model import expression as ex
 
     with ex.fresh():
-        request = Request(index=index, **{**options, "backend": "numpy"})
+        request = RunRequest(index=index, **{**options, "backend": "numpy"})
         # the linear form alone moves inputs
         inputs = None if form == "linear" else ()
         made = compile_target(request, console.report, inputs=inputs, choose=still)

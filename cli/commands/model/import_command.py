@@ -8,7 +8,7 @@ import click
 from sysdyn.cli import whole_files
 from sysdyn.cli.console import Console, with_console
 from sysdyn.cli.failures import UsageError
-from sysdyn.cli.spice.model_text import Writer
+from sysdyn.cli.spice.model_text import ModelTextWriter
 from sysdyn.cli.spice.reading import Reader
 from sysdyn.cli.spice.writing import format_fast
 from sysdyn.dsl.text.decoding import decode
@@ -31,7 +31,7 @@ def command(console: Console, file: str, output: str | None) -> int:
         raise UsageError(f"-o {output}: a model's text ends in .sd")
     source = decode("stdin", sys.stdin.buffer) if file == "-" else SourceText.read(file)
     reader = Reader(source, console.report)
-    text = Writer(reader.netlist, source, console.report).text()
+    text = ModelTextWriter(reader.netlist, source, console.report).text()
     if console.report.failed:
         return console.finish(1)
     text = format_fast(text)

@@ -44,5 +44,5 @@ def command(
     return console.finish()
 
 
-def _models(document: load.Document) -> list[targets.Target]:
+def _models(document: load.ParsedFile) -> list[targets.Target]:
     return [targets.Target(document, m, None) for m in document.models.values()]

@@ -12,7 +12,7 @@ from sysdyn.cli.console import Console, with_console
 from sysdyn.cli.failures import SOLVER, UsageError
 from sysdyn.cli.options import INDICES, chosen
 from sysdyn.cli.page.columns import align, complex_text
-from sysdyn.cli.run.request.asked import Request
+from sysdyn.cli.run.request.asked import RunRequest
 from sysdyn.runtime.trace.opening import replaceable
 
 KINDS = ("bode", "nyquist", "step")
@@ -70,7 +70,7 @@ def command(
     # what is linearised, and where
     form = "3" if index in (None, "auto") else str(index)
     assert form in INDICES
-    request = Request(until=at, index=index, **options)
+    request = RunRequest(until=at, index=index, **options)
     names = None if outputs is None else tuple(text.strip() for text in separate(outputs))
     moved = None if inputs is None else separate(inputs)
     with ex.fresh():

@@ -13,9 +13,9 @@ from sysdyn.cli.failures import SOLVER, UsageError
 from sysdyn.cli.options import scene_command
 from sysdyn.cli.page.columns import align
 from sysdyn.cli.reduce.activity import Activities
-from sysdyn.cli.reduce.reduction import Cost, Reduced, reduce
+from sysdyn.cli.reduce.reduction import Cost, ReducedModel, reduce
 from sysdyn.cli.report.balance import WORDS
-from sysdyn.cli.run.request.asked import Request
+from sysdyn.cli.run.request.asked import RunRequest
 
 KINDS = (".png", ".svg")
 BAR = 24
@@ -39,7 +39,7 @@ def command(
     """
     from sysdyn.cli.commands.simulation.trade_command import budget_of
 
-    request = Request(**options)
+    request = RunRequest(**options)
     # the reduced text has to go somewhere
     if request.file == "-" and output is None and not only:
         raise UsageError("a text from standard input: -o names the reduced one")
@@ -84,7 +84,7 @@ def _activity(found: Activities) -> str:
     return align(rows, right=(2, 3, 4))
 
 
-def _summary(found: Reduced, target: Path, *, kept: bool, timings: bool) -> str:
+def _summary(found: ReducedModel, target: Path, *, kept: bool, timings: bool) -> str:
     """A table of the trials, and what the reduction came to."""
     rows = [["change", "", "share", "error", ""]]
     for t in found.trials:
@@ -114,7 +114,7 @@ def _costs(full: Cost, reduced: Cost, *, timings: bool) -> str:
     return text
 
 
-def _result(found: Reduced, target: str | None, *, timings: bool) -> dict[str, Any]:
+def _result(found: ReducedModel, target: str | None, *, timings: bool) -> dict[str, Any]:
     """The object of --json: activities, trials, costs."""
 
     def cost(c: Cost | None) -> dict[str, Any] | None:

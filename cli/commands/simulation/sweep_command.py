@@ -12,7 +12,7 @@ from sysdyn.cli.failures import UsageError, worst
 from sysdyn.cli.options import chosen, solved
 from sysdyn.cli.page.columns import align
 from sysdyn.cli.run.many.crew import cores
-from sysdyn.cli.run.request.asked import Request, default_output
+from sysdyn.cli.run.request.asked import RunRequest, default_output
 from sysdyn.cli.sweep.in_core import KEEPS
 from sysdyn.cli.sweep.kept import Kept
 from sysdyn.cli.sweep.one_run import Runner
@@ -75,7 +75,7 @@ def command(
         over = (*found.over, *over)
         options["scene"] = options["scene"] or said.pop("scene", None)
         options["model"] = options["model"] or said.pop("model", None)
-    request = Request(file, **options)
+    request = RunRequest(file, **options)
     kept = keep or said.get("keep") or "traces"
     if kept not in KEEPS:
         raise UsageError(f"keep = '{kept}': one of {', '.join(KEEPS)}")

@@ -88,7 +88,7 @@ def _check_start(target: targets.Target, network: Network, report: Report) -> di
 def _check_prepared(target: targets.Target, network: Network, report: Report) -> dict[str, object]:
     """Check numbers, instants, start and passivity of a network; the counts that `check` shows."""
     from sysdyn.cli.run.prepare import prepare  # lowering and arrays: not needed where the text has errors
-    from sysdyn.cli.run.request.asked import Request
+    from sysdyn.cli.run.request.asked import RunRequest
     from sysdyn.cli.run.request.scene_numbers import wrong_numbers
     from sysdyn.cli.run.start.starting import change_lines, counted_as, start
     from sysdyn.cli.run.verdict.expectations import missing_goldens
@@ -102,7 +102,7 @@ def _check_prepared(target: targets.Target, network: Network, report: Report) ->
     scene = network.scene
     # numbers of the scene, before anything is computed with them
     if scene is not None:
-        bare = Request(target.document.file.source.name)
+        bare = RunRequest(target.document.file.source.name)
         report.extend(wrong_numbers(target, prepared.network, prepared.binding.evaluate, bare))
         if report.failed:
             return {"ok": False}

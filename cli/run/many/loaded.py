@@ -21,14 +21,14 @@ from sysdyn.cli.failures import UsageError
 from sysdyn.cli.run.many.in_core import InCore
 from sysdyn.cli.run.prepare import Prepared
 from sysdyn.cli.run.request import targets
-from sysdyn.cli.run.request.asked import Request, check_tolerances, options_of, parameters_of
+from sysdyn.cli.run.request.asked import RunRequest, check_tolerances, options_of, parameters_of
 from sysdyn.cli.run.request.targets import Target
 from sysdyn.cli.run.running import Ran, integrate, ready
-from sysdyn.compiler.binding.again import Way, again
+from sysdyn.compiler.binding.again import Consequences, again
 from sysdyn.compiler.binding.binding import Binding
 from sysdyn.dsl import load
 from sysdyn.dsl.model import expression as ex
-from sysdyn.dsl.rules.asked import Asked
+from sysdyn.dsl.rules.asked import TextConditions
 from sysdyn.dsl.text.diagnostics import Diagnostic, ModelError, Report
 from sysdyn.runtime.many.asked import ROWS, NotApplicableError
 from sysdyn.runtime.model.description import Floats
@@ -46,7 +46,7 @@ Settings = Mapping[str, Any]
 """Names of parameters (`m`, `m[2]`, `M1.R`) and inputs -> numbers in SI units, arrays, or texts of the language."""
 
 
-class Cores:
+class CorePool:
     """A text's structures in the core that no run uses just now: runs side by side (threads) have one each.
 
     refused: why it has none; moving: what changes where parameters change together, None where the options do.
@@ -96,9 +96,9 @@ class Compiled:
     """Its module was compared with its text."""
     lone: threading.Lock = field(default_factory=threading.Lock)
     """Of the run whose structures the next one takes."""
-    ways: dict[frozenset[str], Way | None] = field(default_factory=dict)
+    ways: dict[frozenset[str], Consequences | None] = field(default_factory=dict)
     """What follows from parameters that were set together."""
-    cores: Cores = field(default_factory=Cores)
+    cores: CorePool = field(default_factory=CorePool)
 
     def bound(self, numbers: Mapping[Any, Any]) -> Binding:
         """The text's binding with these numbers: by what follows from them, or anew."""
@@ -151,7 +151,7 @@ def shortly(value: object) -> str:
 class Loaded:
     """A target of a file: `run` it with other numbers.  ModelError, UsageError where text or options are wrong."""
 
-    def __init__(self, request: Request) -> None:
+    def __init__(self, request: RunRequest) -> None:
         check_tolerances(request)
         self.request = request
         report = Report()
@@ -190,7 +190,7 @@ class Loaded:
         return frozenset(found)
 
     @cached_property
-    def _conditions(self) -> tuple[Asked, dict[Any, ex.Node]]:
+    def _conditions(self) -> tuple[TextConditions, dict[Any, ex.Node]]:
         """What the text asks of its numbers, with the space of its expressions."""
         nodes, request = dict[Any, ex.Node](), self.request
         with ex.fresh(nodes):
@@ -310,7 +310,7 @@ class Loaded:
         prepared, compiled = self.bound(settings)
         return (self._run_alone if alone else self._run)(request, prepared, compiled, report)
 
-    def _run_alone(self, request: Request, prepared: Prepared, compiled: Compiled, report: Report) -> Ran | None:
+    def _run_alone(self, request: RunRequest, prepared: Prepared, compiled: Compiled, report: Report) -> Ran | None:
         """A run of which nobody looks at more than its trace once the next one begins."""
         network = prepared.network
         eventful = network.events or network.switches or prepared.compiled.form.kinks
@@ -357,7 +357,7 @@ class Loaded:
         core.set_up()
         return core
 
-    def _run(self, request: Request, prepared: Prepared, compiled: Compiled, report: Report) -> Ran | None:
+    def _run(self, request: RunRequest, prepared: Prepared, compiled: Compiled, report: Report) -> Ran | None:
         with ex.fresh(compiled.nodes):
             options = options_of(request, self.target, prepared, report, time.monotonic(), None, held=True)
             if options is None:

@@ -29,7 +29,7 @@ from sysdyn.dsl.model.units import si_text
 from sysdyn.dsl.text.diagnostics import Report
 from sysdyn.runtime.accuracy.options import Options, Progress
 from sysdyn.runtime.events.plan import Plan
-from sysdyn.runtime.trace.trace import Parameter
+from sysdyn.runtime.trace.trace import TraceParameter
 from sysdyn.values import dataclass
 
 ACCURACY = 1e-4
@@ -42,7 +42,7 @@ LISTED = 1000
 
 
 @dataclass(frozen=True, slots=True)
-class Request:
+class RunRequest:
     """The options of `simulate` as given; None where the scene or the default decides.  Texts are expressions."""
 
     file: str
@@ -73,7 +73,7 @@ class Request:
     text: str | None = None  # what stood on standard input, for processes beside the one that read it
 
 
-def check_tolerances(request: Request) -> None:
+def check_tolerances(request: RunRequest) -> None:
     """UsageError where --accuracy, --rtol, --atol make no sense."""
     # the tool chooses the tolerances, or the author does
     if request.accuracy is not None and (request.rtol is not None or request.atol is not None):
@@ -91,13 +91,13 @@ def check_tolerances(request: Request) -> None:
         raise UsageError(f"--atol {request.atol:g}: it must not be negative")
 
 
-def _redundancy(request: Request, network: Network) -> str:
+def _redundancy(request: RunRequest, network: Network) -> str:
     """What shall become of redundant constraints."""
     return request.redundancy or (network.scene.redundancy if network.scene else None) or "error"
 
 
 def instants_of(
-    request: Request, document: load.Document, report: Report
+    request: RunRequest, document: load.ParsedFile, report: Report
 ) -> tuple[float | None, tuple[float, ...], float | None]:
     """--until, --at and --max-wall in s; None, or left out, where they are not given or the report says why not."""
 
@@ -118,7 +118,7 @@ def instants_of(
 
 
 def options_of(
-    request: Request,
+    request: RunRequest,
     target: Target,
     prepared: Prepared,
     report: Report,
@@ -244,7 +244,7 @@ def _timeless(prepared: Prepared) -> bool:
     return bool(prepared.layouts["timeless"]["so"])
 
 
-def _step(request: Request, target: Target, method: str, said: float | None, report: Report) -> float | None:
+def _step(request: RunRequest, target: Target, method: str, said: float | None, report: Report) -> float | None:
     """Of euler, in s: the request's, else what the scene says."""
     if request.step is None:
         if method == "euler" and said is None:
@@ -277,7 +277,9 @@ def timeless(prepared: Prepared) -> bool:
     return not any(node.op == "time" for node in ex.topological([*rows, *read]))
 
 
-def _accuracy(request: Request, scene: Scene, prepared: Prepared) -> tuple[float | None, tuple[tuple[str, float], ...]]:
+def _accuracy(
+    request: RunRequest, scene: Scene, prepared: Prepared
+) -> tuple[float | None, tuple[tuple[str, float], ...]]:
     """Accuracy of all traced quantities (None: of those alone that the scene names), and of those that it names."""
     if request.accuracy is not None:
         return request.accuracy, ()
@@ -350,7 +352,7 @@ def model_digest(target: Target) -> str:
     return hashlib.sha256(target.document.file.source.text.encode("utf-8", "surrogatepass")).hexdigest()
 
 
-def parameters_of(prepared: Prepared) -> Iterator[Parameter]:
+def parameters_of(prepared: Prepared) -> Iterator[TraceParameter]:
     """Parameters in SI units, arrays element by element (`m[2]`); arrays of more than LISTED elements are left out."""
     evaluate, values = prepared.binding.evaluate, prepared.binding.values
     units = prepared.layouts.setdefault("units of parameters", {})
@@ -362,7 +364,7 @@ def parameters_of(prepared: Prepared) -> Iterator[Parameter]:
     for name, (shape, unit) in units.items():
         # a scalar
         if not shape:
-            yield Parameter(name, float(values[name]), unit)
+            yield TraceParameter(name, float(values[name]), unit)
             continue
         array = np.asarray(values[name])
         first = [round(evaluate(low)) for low, _ in shape]
@@ -370,7 +372,7 @@ def parameters_of(prepared: Prepared) -> Iterator[Parameter]:
             continue
         for at, value in np.ndenumerate(array):
             index = ",".join(str(a + b) for a, b in zip(at, first, strict=True))
-            yield Parameter(f"{name}[{index}]", float(value), unit)
+            yield TraceParameter(f"{name}[{index}]", float(value), unit)
 
 
 def rest(options: Options) -> float:

@@ -11,7 +11,7 @@ from collections.abc import Iterator
 from dataclasses import replace
 from itertools import islice, product
 
-from sysdyn.compiler.model.energies import EnergyModel, Family, Quantity
+from sysdyn.compiler.model.energies import EnergyModel, TracedQuantity, UnknownFamily
 from sysdyn.compiler.model.parameters import Parameters, extents
 from sysdyn.compiler.network.authors import Authors, in_author_names, owner
 from sysdyn.dsl.model.expression import const, var
@@ -25,7 +25,7 @@ MOST = 1000
 def with_coordinates_observed(model: EnergyModel, network: Network) -> tuple[EnergyModel, tuple[Diagnostic, ...]]:
     """The model with a stored quantity for each coordinate and each dynamic variable."""
     parameters, own = Parameters(network, {}), network.authors
-    found: list[Quantity] = []
+    found: list[TracedQuantity] = []
     notes: list[Diagnostic] = []
     kinds = [(c, model.mirror.coordinate, "q") for c in model.coordinates] + [(s, "s", "s") for s in model.states]
     for family, kind, unit in kinds:
@@ -44,9 +44,9 @@ def with_coordinates_observed(model: EnergyModel, network: Network) -> tuple[Ene
 
 
 def _elements(
-    family: Family, kind: str, unit: str, box: tuple[tuple[int, int], ...], authors: Authors
-) -> Iterator[Quantity]:
+    family: UnknownFamily, kind: str, unit: str, box: tuple[tuple[int, int], ...], authors: Authors
+) -> Iterator[TracedQuantity]:
     for at in product(*(range(first, last + 1) for first, last in box)):
         name = f"{family.name}[{', '.join(map(str, at))}]" if at else family.name
         name = in_author_names(name, authors)
-        yield Quantity(name, var(family.name, kind, *(const(k) for k in at)), True, unit, family.place)
+        yield TracedQuantity(name, var(family.name, kind, *(const(k) for k in at)), True, unit, family.place)

@@ -10,32 +10,32 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator, Sequence, Set
 from dataclasses import replace
 
-from sysdyn.compiler.network.primal.bounds import Box, Sizes, meet
+from sysdyn.compiler.network.primal.bounds import Box, WholeNumbers, meet
 from sysdyn.compiler.network.primal.contents import TELLING, contents_by_text
 from sysdyn.compiler.network.primal.cycles import in_loops
 from sysdyn.compiler.network.primal.integrals import line
 from sysdyn.compiler.network.primal.overlaps import ranges_of, restrict_loops, untold
 from sysdyn.compiler.network.primal.reading import Rewriter
 from sysdyn.dsl.model.expression import Node, const, var, variables
-from sysdyn.dsl.model.network import Branch, Energy, Initial, Loop, Network
+from sysdyn.dsl.model.network import Branch, EnergyTerm, InitialCondition, Loop, Network
 
 
 def guess_contents(
     network: Network,
     constant: Set[Branch],
-    initials: Sequence[Initial],
-    sizes: Sizes,
+    initials: Sequence[InitialCondition],
+    sizes: WholeNumbers,
     reader: Rewriter,
     *,
     reflected: bool,
-) -> tuple[tuple[Initial, ...], frozenset[str]]:
+) -> tuple[tuple[InitialCondition, ...], frozenset[str]]:
     """One guess for the stores of a statement that are measured by their contents; the stores all of whose guesses by
     the text are among them.  constant: those that hold the same whatever happens.
 
     Between common-flow nodes of the author's network positions are guessed, not lengths, but where the text guesses
     lengths that close a loop, or all of them.
     """
-    found: list[tuple[Initial, set[tuple[str, str]]]] = []
+    found: list[tuple[InitialCondition, set[tuple[str, str]]]] = []
     shared: set[tuple[str, str]] = set()
     held: dict[tuple[str, str], list[Box]] = {}
     known = {initial.store for initial in initials}
@@ -73,7 +73,7 @@ def guess_contents(
     return kept, frozenset(i.store for i in kept if i.said)
 
 
-def _lengths_guessed(lengths: Sequence[Branch], initials: Sequence[Initial]) -> bool:
+def _lengths_guessed(lengths: Sequence[Branch], initials: Sequence[InitialCondition]) -> bool:
     """Whether the text tells the contents of such stores that close a loop, where guesses may miss each other, or of
     all: guesses of positions are none then.
     """
@@ -85,20 +85,20 @@ def _lengths_guessed(lengths: Sequence[Branch], initials: Sequence[Initial]) -> 
     )
 
 
-def _parts(b: Branch, initials: Sequence[Initial], sizes: Sizes) -> Iterator[Initial]:
+def _parts(b: Branch, initials: Sequence[InitialCondition], sizes: WholeNumbers) -> Iterator[InitialCondition]:
     """Guesses of the contents of a statement's elements: by the text, fixed or not, and zero where it says nothing, or
     in words of which only the start can tell a content.
     """
-    telling = list[Initial]()
+    telling = list[InitialCondition]()
     for i, loops, content in contents_by_text(b, [i for i in initials if _tells(i, b)], sizes):
         telling.append(i)
         yield replace(i, value=content, loops=loops, fixed=False, said=not i.fixed)
     within = ranges_of(b.loops, sizes, b.place)
-    zero = Initial(const(0.0), const(0.0), False, b.loops, b.place, said=False)
+    zero = InitialCondition(const(0.0), const(0.0), False, b.loops, b.place, said=False)
     yield from (replace(zero, loops=restrict_loops(b.loops, ranges)) for ranges in untold(telling, b.at, within, sizes))
 
 
-def _tells(i: Initial, b: Branch) -> bool:
+def _tells(i: InitialCondition, b: Branch) -> bool:
     """Whether an initial condition is about what a store holds."""
     if i.target.op != "var" or i.target.data[0] != b.name:
         return False
@@ -129,6 +129,6 @@ def _owners(read: Iterable[Node]) -> set[tuple[str, str]]:
     return {(n.data[0], n.data[1]) for n in read}
 
 
-def _written(energies: Iterable[Energy]) -> set[tuple[str, str]]:
+def _written(energies: Iterable[EnergyTerm]) -> set[tuple[str, str]]:
     """Coordinates that energies of the text read: what these hold is no store's content."""
     return _owners(n for e in energies for n in variables(e.expression) if n.op == "var")

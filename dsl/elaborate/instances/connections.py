@@ -37,7 +37,7 @@ class Ends:
 class Connections(Statements):
     """Resolves ends of branches and labels of instances."""
 
-    def _label(self, s: syntax.Instance) -> tuple[tuple[Node, ...], Shape]:
+    def _label(self, s: syntax.InstanceStatement) -> tuple[tuple[Node, ...], Shape]:
         """Indices of a label, and first and last of each; a `for` around must show in them."""
         own = self.resolver.loops[len(self.current.loops) :]
         # `R1: resistor(...)`: one element
@@ -64,7 +64,9 @@ class Connections(Statements):
             raise self.resolver.fail("E106", message, s.decl.span, help=f"{s.decl.name}[{own[-1].index}]")
         return at, tuple(shape)
 
-    def _ends(self, s: syntax.Instance, connection: syntax.Connection, domain: DomainSymbol | None = None) -> Ends:
+    def _ends(
+        self, s: syntax.InstanceStatement, connection: syntax.Connection, domain: DomainSymbol | None = None
+    ) -> Ends:
         """Ends of a branch from `a -> b`, `a` (for a -> ground) or `on expr`."""
         match connection:
             # `a -> b`
@@ -132,7 +134,7 @@ class Connections(Statements):
         return self.resolver.fail("E401", message, span, help=help_, subject=subject)
 
     def _is_displacement_of(
-        self, s: syntax.Instance, domain: DomainSymbol | None, value: Typed, connection: syntax.On
+        self, s: syntax.InstanceStatement, domain: DomainSymbol | None, value: Typed, connection: syntax.On
     ) -> None:
         """E208: the expression along which an element acts is a displacement of its domain."""
         if domain is None or value.dimension is None or value.dimension == domain.displacement.dimension:
@@ -225,7 +227,7 @@ class Connections(Statements):
     def _text(self, e: syntax.Expr) -> str:
         return self.source_text(e.span)[:60]
 
-    def _domain_of(self, s: syntax.Instance, ends: Ends) -> DomainSymbol:
+    def _domain_of(self, s: syntax.InstanceStatement, ends: Ends) -> DomainSymbol:
         if ends.domain is None:
             raise self.resolver.fail(
                 "E403",
@@ -237,7 +239,7 @@ class Connections(Statements):
 
     def _domain_on(self, e: syntax.Expr, value: Typed) -> DomainSymbol | None:
         """Domain of one coordinate, branch or node; else the one domain whose displacement has that dimension."""
-        inner = e.expr if isinstance(e, syntax.Group) else e
+        inner = e.expr if isinstance(e, syntax.Parenthesized) else e
         found = self.resolver.locate(inner.base if isinstance(inner, syntax.Member) and inner.name == "q" else inner)
         if found is not None and isinstance(found.symbol, (UnknownSymbol, BranchSymbol, NodeSymbol)):
             return found.symbol.domain

@@ -17,7 +17,7 @@ from sysdyn.dsl.names.symbols import (
     BranchSymbol,
     DomainSymbol,
     End,
-    Family,
+    NameFamily,
     Space,
     TwoPortSymbol,
     Typed,
@@ -43,7 +43,7 @@ class Elements(Connections):
         super().__init__(report)
         self.pending: list[Pending] = []
 
-    def _builtin(self, s: syntax.Instance) -> None:
+    def _builtin(self, s: syntax.InstanceStatement) -> None:
         """A one-port or two-port: its ends, its branches, its law for later."""
         kind = s.component.names[0]
         at, shape = self._label(s)
@@ -73,7 +73,7 @@ class Elements(Connections):
         self._enter_element(TwoPortSymbol(s.decl.name, (one, two), self.place(s.decl.span)), one)
         self._later_ratio((one, two), at, (kind, side, value, span), (both[0], both[1]), s)
 
-    def _law_argument(self, s: syntax.Instance, kind: str) -> tuple[str, syntax.Expr, syntax.Span]:
+    def _law_argument(self, s: syntax.InstanceStatement, kind: str) -> tuple[str, syntax.Expr, syntax.Span]:
         """Which variable the law of a builtin element gives, the expression, its place."""
         sides = ("e", "f", "p", "q") if kind in ONE_PORTS else ("e1", "e2", "f1", "f2")
         args = s.args or ()
@@ -90,7 +90,9 @@ class Elements(Connections):
             )
         return args[0].name, args[0].value, args[0].span
 
-    def _branch_symbol(self, s: syntax.Instance, name: str, domain: DomainSymbol, shape: Shape) -> BranchSymbol:
+    def _branch_symbol(
+        self, s: syntax.InstanceStatement, name: str, domain: DomainSymbol, shape: Shape
+    ) -> BranchSymbol:
         return BranchSymbol(name, self.current.family(name, shape), domain, self.place(s.decl.span))
 
     def _enter_element(self, symbol: BranchSymbol | TwoPortSymbol, first: BranchSymbol) -> None:
@@ -119,7 +121,7 @@ class Elements(Connections):
         kind: str | None,
         span: syntax.Span,
         ends: Ends,
-        s: syntax.Instance | syntax.Law,
+        s: syntax.InstanceStatement | syntax.LawStatement,
     ) -> None:
         """The law is resolved when all names are known."""
         loops, bound = self.resolver.loops, self.resolver.sight()
@@ -173,7 +175,7 @@ class Elements(Connections):
         at: tuple[Node, ...],
         law: tuple[str, str, syntax.Expr, syntax.Span],
         ends: tuple[Ends, Ends],
-        s: syntax.Instance,
+        s: syntax.InstanceStatement,
     ) -> None:
         """The ratio of a two-port is resolved when all names are known."""
         loops, bound = self.resolver.loops, self.resolver.sight()
@@ -212,7 +214,7 @@ class Elements(Connections):
                     "W101", message, self.place(node.span), help="rename the outer one, or write it as a let"
                 )
 
-    def law(self, s: syntax.Law) -> None:
+    def law(self, s: syntax.LawStatement) -> None:
         """`law e = R*f`, `law b.e = ...`: the right edge of the diagram for a branch of the component."""
         name, letter = "", None
         if isinstance(s.left, syntax.Name):
@@ -251,4 +253,4 @@ def _hull(a: BranchSymbol, b: BranchSymbol) -> BranchSymbol:
         (ex.call("min", first, other), ex.call("max", last, end))
         for (first, last), (other, end) in zip(a.family.shape, b.family.shape, strict=True)
     )
-    return BranchSymbol(a.name, Family(a.family.name, a.family.prefix, a.family.around, shape), a.domain, a.place)
+    return BranchSymbol(a.name, NameFamily(a.family.name, a.family.prefix, a.family.around, shape), a.domain, a.place)

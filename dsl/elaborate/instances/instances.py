@@ -15,7 +15,7 @@ from sysdyn.dsl.elaborate.files import FileScope, library_components
 from sysdyn.dsl.elaborate.instances.head import Body, Interface
 from sysdyn.dsl.elaborate.instances.levels import choose_level, elsewhere
 from sysdyn.dsl.elaborate.instances.moulds import Moulds, charge
-from sysdyn.dsl.elaborate.instances.ports import Asked, Ports
+from sysdyn.dsl.elaborate.instances.ports import PortRequest, Ports
 from sysdyn.dsl.elaborate.instances.unit_variables import solve_units
 from sysdyn.dsl.elaborate.parts import flatten
 from sysdyn.dsl.elaborate.statements.declarations import DECLARED
@@ -62,8 +62,8 @@ class Instances(Ports):
         """Enter the labels of all instances, then elaborate each (or earlier, when another asks for it)."""
         waiting = []
         unfinished = self._unread_elements(body)
-        for statement, loops in body.statements_of(syntax.Instance):
-            assert isinstance(statement, syntax.Instance)
+        for statement, loops in body.statements_of(syntax.InstanceStatement):
+            assert isinstance(statement, syntax.InstanceStatement)
             try:
                 if id(statement) in unfinished:
                     raise Failed
@@ -76,15 +76,17 @@ class Instances(Ports):
 
     def _unread_elements(self, body: Body) -> list[int]:
         """Elements whose connections stand, indented, on a line that could not be read: nothing is said of them."""
-        if not body.statements_of(syntax.Broken):
+        if not body.statements_of(syntax.BrokenStatement):
             return []
         text = self.current.source.text
         pairs = pairwise(statement for statement, _ in body)
         return [
-            id(s) for s, then in pairs if isinstance(then, syntax.Broken) and _column(text, then) > _column(text, s)
+            id(s)
+            for s, then in pairs
+            if isinstance(then, syntax.BrokenStatement) and _column(text, then) > _column(text, s)
         ]
 
-    def _plan(self, s: syntax.Instance, loops: tuple[syntax.For, ...]) -> Callable[[], None]:
+    def _plan(self, s: syntax.InstanceStatement, loops: tuple[syntax.ForStatement, ...]) -> Callable[[], None]:
         """What is to be done of an instance when it is read or its turn comes: a builtin, or a component."""
         name = s.component.names[0]
         symbol = self.scope.component(name)
@@ -141,7 +143,11 @@ class Instances(Ports):
         return elaborate
 
     def _wait(
-        self, symbol: InstanceSymbol, s: syntax.Instance, loops: tuple[syntax.For, ...], component: ComponentSymbol
+        self,
+        symbol: InstanceSymbol,
+        s: syntax.InstanceStatement,
+        loops: tuple[syntax.ForStatement, ...],
+        component: ComponentSymbol,
     ) -> Callable[[], None]:
         """The instance is elaborated once, by whoever needs it first."""
         here = self.current
@@ -168,7 +174,7 @@ class Instances(Ports):
         for do in self._waiting.pop(id(symbol), ()):
             do()
 
-    def _component(self, symbol: InstanceSymbol, s: syntax.Instance, component: ComponentSymbol) -> None:
+    def _component(self, symbol: InstanceSymbol, s: syntax.InstanceStatement, component: ComponentSymbol) -> None:
         """One instance of a component: its path and level, then its body; E801 where it contains itself."""
         chain = (*self.current.chain, self.current.component)
         # a component that has itself inside, at any depth
@@ -205,14 +211,14 @@ class Instances(Ports):
         return self._insides[key][1]
 
     def _fill(
-        self, symbol: InstanceSymbol, s: syntax.Instance, component: ComponentSymbol, space: Space, body: Body
+        self, symbol: InstanceSymbol, s: syntax.InstanceStatement, component: ComponentSymbol, space: Space, body: Body
     ) -> None:
         """Arguments and connections, then the statements of the body, in the space of the instance."""
-        head, broken, place = body.head, body.statements_of(syntax.Broken), self.place(s.span)
+        head, broken, place = body.head, body.statements_of(syntax.BrokenStatement), self.place(s.span)
         # a component with lines that could not be read: what seems to be missing may stand there
         with self._unread() if broken else nullcontext():
             arguments, inputs = self._arguments(s, component, head, space)
-            self.connect(Asked(s, component, head, space, inputs))
+            self.connect(PortRequest(s, component, head, space, inputs))
         # `$u` in units: found from the arguments before anything is declared
         if head.generic:
             solve_units(self, s, space, head, arguments, inputs)
@@ -220,7 +226,7 @@ class Instances(Ports):
         # parameters first: sizes of ports and bounds of loops may read them
         with self.entering(space):
             for statement, _ in broken:
-                assert isinstance(statement, syntax.Broken)
+                assert isinstance(statement, syntax.BrokenStatement)
                 self.scope.broken |= statement.names
             self.declare_parameters(body, arguments)
             self.port_shapes(s, head)
@@ -228,7 +234,9 @@ class Instances(Ports):
         if head.inputs:
             self.bind_inputs(s, space, head, inputs)
         with (
-            self.entering(space) if body.with_loops(DECLARED) or body.statements_of(syntax.Instance) else nullcontext()
+            self.entering(space)
+            if body.with_loops(DECLARED) or body.statements_of(syntax.InstanceStatement)
+            else nullcontext()
         ):
             self.declare_all(body, self.declare)
             self.bodies.append((space, body))
@@ -249,7 +257,7 @@ class Instances(Ports):
             before.extend(d for d in silent if not d.code.startswith("E4"))
 
     def _arguments(
-        self, s: syntax.Instance, component: ComponentSymbol, head: Interface, space: Space
+        self, s: syntax.InstanceStatement, component: ComponentSymbol, head: Interface, space: Space
     ) -> tuple[dict[str, Argument], dict[str, syntax.Expr]]:
         """Values of parameters, and inputs; those that a level chosen by the scene has no use for are left out."""
         found: dict[str, Argument] = {}
@@ -259,7 +267,7 @@ class Instances(Ports):
             # `resistor(5 ohm)`
             if arg.name is None:
                 text = self.source_text(arg.span)
-                taken: dict[str, syntax.Param | syntax.Input] = {**head.parameters, **head.inputs}
+                taken: dict[str, syntax.ParamStatement | syntax.InputStatement] = {**head.parameters, **head.inputs}
                 names = [n for n, p in taken.items() if p.value is None] or [*taken]
                 help_ = (
                     f"{names[0]} = {text}"
@@ -301,7 +309,12 @@ class Instances(Ports):
         return found, inputs
 
     def _require_values(
-        self, s: syntax.Instance, place: Place, component: ComponentSymbol, head: Interface, given: dict[str, Argument]
+        self,
+        s: syntax.InstanceStatement,
+        place: Place,
+        component: ComponentSymbol,
+        head: Interface,
+        given: dict[str, Argument],
     ) -> None:
         for name, statement in head.parameters.items():
             if statement.value is None and name not in given:

@@ -18,7 +18,7 @@ from sysdyn.dsl.names.symbols import (
     ComponentSymbol,
     DomainSymbol,
     End,
-    Family,
+    NameFamily,
     NodeSymbol,
     PortSymbol,
     Space,
@@ -32,12 +32,12 @@ from sysdyn.values import dataclass
 
 
 @dataclass(frozen=True, slots=True)
-class Asked:
+class PortRequest:
     """An instance, what its component asks for, and its space; inputs: what they are bound to; bound: ports and
     branches that are.
     """
 
-    s: syntax.Instance
+    s: syntax.InstanceStatement
     component: ComponentSymbol
     head: Interface
     space: Space
@@ -45,7 +45,7 @@ class Asked:
     bound: set[str] = field(default_factory=set)
 
 
-def port_declaration(statement: syntax.Port, name: str) -> syntax.Decl:
+def port_declaration(statement: syntax.PortStatement, name: str) -> syntax.Decl:
     """A port's own name and indices, in a statement of several."""
     return next(d for d in statement.decls if d.name == name)
 
@@ -53,7 +53,7 @@ def port_declaration(statement: syntax.Port, name: str) -> syntax.Decl:
 class Ports(Inputs):
     """Connects instances."""
 
-    def connect(self, asked: Asked) -> None:
+    def connect(self, asked: PortRequest) -> None:
         """Binds all ports, branches and inputs."""
         s, head = asked.s, asked.head
         for connection in s.connections:
@@ -85,7 +85,7 @@ class Ports(Inputs):
                     "E414", f"input '{name}' of '{s.decl.name}' is not bound", s.span, help=f"{name} = ..."
                 )
 
-    def _by_name(self, asked: Asked, connection: syntax.Connection) -> Failed:
+    def _by_name(self, asked: PortRequest, connection: syntax.Connection) -> Failed:
         """Report E402: nodes in a row where each belongs to a port of its own."""
         s, head = asked.s, asked.head
         ports = [*head.ports, *filter(None, head.branches)]
@@ -109,7 +109,7 @@ class Ports(Inputs):
         message = f"'{s.decl.name}: {asked.component.name}' is connected by name: {', '.join((*ports, *head.inputs))}"
         return self.resolver.fail("E402", message, connection.span, help=", ".join(pairs))
 
-    def _bind(self, asked: Asked, connection: syntax.Bind) -> None:
+    def _bind(self, asked: PortRequest, connection: syntax.Bind) -> None:
         """`name = value`: a port, an input, or a branch to ground."""
         s, head, inputs = asked.s, asked.head, asked.inputs
         name = connection.name.name
@@ -127,13 +127,13 @@ class Ports(Inputs):
         else:
             raise self._no_such_name(asked, connection)
 
-    def _no_such_name(self, asked: Asked, connection: syntax.Bind) -> Failed:
+    def _no_such_name(self, asked: PortRequest, connection: syntax.Bind) -> Failed:
         """Report E407: what is meant by a name that the component does not have."""
         s, component, head, name = asked.s, asked.component, asked.head, connection.name.name
         near = nearest(name, (*head.ports, *head.inputs, *head.branches))
         names = ", ".join((*head.ports, *head.inputs, *filter(None, head.branches)))
         help_ = f"nearest: '{near}'" if near else f"it has {names or 'none'}"
-        nodes = [s for s in component.body if isinstance(s, syntax.Node)]
+        nodes = [s for s in component.body if isinstance(s, syntax.NodeStatement)]
         inner = next((s.domain.name for s in nodes if any(d.name == name for d in s.decls)), None)
         if inner is not None:
             help_ = f"port {name}: {inner} in component '{component.name}': a node is of its inside alone"
@@ -144,7 +144,7 @@ class Ports(Inputs):
             "E407", f"'{component.name}' has no port or input '{name}'", connection.span, help=help_
         )
 
-    def _bind_port(self, asked: Asked, name: str, value: syntax.Expr) -> None:
+    def _bind_port(self, asked: PortRequest, name: str, value: syntax.Expr) -> None:
         """A port: one node, an array of them, or a bundle."""
         s, space, statement = asked.s, asked.space, asked.head.ports[name]
         asked.bound.add(name)
@@ -166,7 +166,9 @@ class Ports(Inputs):
         self._same_domain(s, f"port '{name}'", wanted, bound_to, value)
         space.scope.symbols[name] = PortSymbol(name, bound_to, place)
 
-    def _array_bound(self, s: syntax.Instance, name: str, wanted: DomainSymbol, value: syntax.Expr) -> NodeSymbol:
+    def _array_bound(
+        self, s: syntax.InstanceStatement, name: str, wanted: DomainSymbol, value: syntax.Expr
+    ) -> NodeSymbol:
         """A port that is an array: the array of nodes that it is bound to, under the port's name."""
         found = self.resolver.locate(value)
         symbol = None if found is None else found.symbol
@@ -178,11 +180,11 @@ class Ports(Inputs):
             raise self.resolver.fail("E805", message, value.span, help=f"node a[1..3]: {wanted.name}, and {name} = a")
         own, place = symbol.family, self.place(value.span)
         prefix = tuple(ex.substitute(a, found.change) for a in own.prefix)
-        node = NodeSymbol(name, Family(own.name, prefix, own.around, own.shape), symbol.domain, place, coordinate)
+        node = NodeSymbol(name, NameFamily(own.name, prefix, own.around, own.shape), symbol.domain, place, coordinate)
         self._same_domain(s, f"port '{name}'", wanted, End(node, (), symbol.domain), value)
         return node
 
-    def port_shapes(self, s: syntax.Instance, head: Interface) -> None:
+    def port_shapes(self, s: syntax.InstanceStatement, head: Interface) -> None:
         """E805: ports that are arrays have the bounds of the nodes that they are bound to."""
         for name, statement in head.ports.items():
             decl, symbol = port_declaration(statement, name), self.scope.symbols.get(name)
@@ -196,7 +198,9 @@ class Ports(Inputs):
                 where = symbol.place
                 self.report.error("E805", message, where, help=f"nodes over {shown[0]}")
 
-    def _bundle_bound(self, s: syntax.Instance, name: str, wanted: BundleSymbol, value: syntax.Expr) -> BundleNode:
+    def _bundle_bound(
+        self, s: syntax.InstanceStatement, name: str, wanted: BundleSymbol, value: syntax.Expr
+    ) -> BundleNode:
         """A port of several nodes, bound to a bundle of the same members or to ground."""
         place = self.place(value.span)
         if isinstance(value, syntax.Name) and value.name == "ground":
@@ -212,12 +216,14 @@ class Ports(Inputs):
             name, found.symbol, change, lambda node: self._node_end(node, indices, change, value), place
         )
 
-    def _same_domain(self, s: syntax.Instance, what: str, wanted: DomainSymbol, end: End, value: syntax.Expr) -> None:
+    def _same_domain(
+        self, s: syntax.InstanceStatement, what: str, wanted: DomainSymbol, end: End, value: syntax.Expr
+    ) -> None:
         if end.domain.name != wanted.name:
             message = f"{what} of '{s.decl.name}' is {wanted.name}, node '{self._text(value)}' is {end.domain.name}"
             raise self.other_domain(message, wanted, end, value.span)
 
-    def _bind_branch(self, asked: Asked, name: str, connection: syntax.Connection) -> None:
+    def _bind_branch(self, asked: PortRequest, name: str, connection: syntax.Connection) -> None:
         """A branch between two ends, or along an expression."""
         s, head, space = asked.s, asked.head, asked.space
         # a name that the component does not have, or that is a port of one node
@@ -248,7 +254,7 @@ class Ports(Inputs):
             assert end.node is not None
             message = f"'{s.decl.name}' is {wanted.name}, its node '{end.node.name}' is {ends.domain.name}"
             raise self.other_domain(message, wanted, end, connection.span)
-        family = Family(f"{space.path}.{name}" if name else space.path, space.prefix, space.around, ())
+        family = NameFamily(f"{space.path}.{name}" if name else space.path, space.prefix, space.around, ())
         symbol = BranchSymbol(name or s.decl.name, family, wanted, self.place(s.decl.span))
         space.scope.symbols[name] = symbol
         space.ends[name] = ends

@@ -8,11 +8,11 @@ from dataclasses import replace
 
 from sysdyn.dsl.elaborate.instances.head import Body
 from sysdyn.dsl.elaborate.statements import events
-from sysdyn.dsl.elaborate.statements.parameters import Parameters
+from sysdyn.dsl.elaborate.statements.parameters import ParameterDeclarations
 from sysdyn.dsl.model import dimensions as dim
 from sysdyn.dsl.model import expression as ex
 from sysdyn.dsl.model.expression import Node
-from sysdyn.dsl.model.network import Coordinate, Initial, Loop, NodeFamily, State, Unknown
+from sysdyn.dsl.model.network import Coordinate, InitialCondition, Loop, NodeFamily, State, Unknown
 from sysdyn.dsl.model.units import NONE, Dimension, si
 from sysdyn.dsl.names import habits
 from sysdyn.dsl.names.context import Use
@@ -23,7 +23,7 @@ from sysdyn.dsl.names.symbols import (
     ConstraintSymbol,
     Definition,
     DomainSymbol,
-    Family,
+    NameFamily,
     NodeSymbol,
     PortSymbol,
     UnknownSymbol,
@@ -34,27 +34,27 @@ from sysdyn.dsl.text.diagnostics import Related, Report
 from sysdyn.dsl.tree import syntax
 
 DECLARED = (
-    syntax.Coord,
-    syntax.Implicit,
-    syntax.State,
-    syntax.Node,
-    syntax.Let,
-    syntax.Output,
-    syntax.Quasi,
-    syntax.Constraint,
-    syntax.Discrete,
+    syntax.CoordStatement,
+    syntax.ImplicitStatement,
+    syntax.StateStatement,
+    syntax.NodeStatement,
+    syntax.LetStatement,
+    syntax.OutputStatement,
+    syntax.QuasiStatement,
+    syntax.ConstraintStatement,
+    syntax.DiscreteStatement,
 )
 """Statements that bring names into a scope by `declare`."""
-BEGINNING = (syntax.Coord, syntax.Implicit, syntax.State, syntax.Node)
+BEGINNING = (syntax.CoordStatement, syntax.ImplicitStatement, syntax.StateStatement, syntax.NodeStatement)
 """Those that may say a value to begin with, which is read by `begin` once all names stand."""
 
 
-class Declarations(Parameters):
+class Declarations(ParameterDeclarations):
     """Brings the names of a space into scope."""
 
     def __init__(self, report: Report) -> None:
         super().__init__(report)
-        self._begun: dict[tuple[Node, tuple[Loop, ...], int], Initial] = {}  # by target, loops, depth
+        self._begun: dict[tuple[Node, tuple[Loop, ...], int], InitialCondition] = {}  # by target, loops, depth
 
     def declare_all(self, body: Body, do: Callable[[syntax.Statement], None], more: tuple[type, ...] = ()) -> None:
         """The names of a body by `do`, in any order: what takes its unit from a value comes behind what that reads,
@@ -63,7 +63,11 @@ class Declarations(Parameters):
         statements = body.with_loops((*DECLARED, *more))
         self.each([s for s in statements if not _takes_its_unit(s[0])], do)
         if late := [s for s in statements if _takes_its_unit(s[0])]:
-            named = {s.decl.name: (s, at) for s, at in late if isinstance(s, syntax.State | syntax.Discrete)}
+            named = {
+                s.decl.name: (s, at)
+                for s, at in late
+                if isinstance(s, syntax.StateStatement | syntax.DiscreteStatement)
+            }
             self.each(late if len(named) < len(late) else self.by_dependence(named), do)
         self.each(body.statements_of(BEGINNING), self.begin)
 
@@ -71,36 +75,42 @@ class Declarations(Parameters):
         """One declaration; statements of other kinds are passed over."""
         match statement:
             # `coord x: translation`
-            case syntax.Coord():
+            case syntax.CoordStatement():
                 self._coordinates(statement)
             # `implicit F: N`: an unknown that gammas determine
-            case syntax.Implicit():
+            case syntax.ImplicitStatement():
                 unit = self.unit(statement.unit)
                 for decl in statement.decls:
                     family = self.current.family(decl.name, self.shape(decl))
                     self._enter_unknown(decl, "e", family, unit.dimension, None, False)
                     self.parts.unknowns.append(Unknown(family.name, family.whole, unit, self.place(decl.span)))
-            case syntax.State():
+            case syntax.StateStatement():
                 self._state(statement)
-            case syntax.Node():
+            case syntax.NodeStatement():
                 self._nodes(statement)
             # resolved when they are read first: they may read what stands below
-            case syntax.Let() | syntax.Output() | syntax.Quasi():
+            case syntax.LetStatement() | syntax.OutputStatement() | syntax.QuasiStatement():
                 self._definition(statement)
             # a label: its multiplier and residual can be read
-            case syntax.Constraint():
+            case syntax.ConstraintStatement():
                 decl = statement.decl
                 family = self.current.family(decl.name)
                 self.enter(ConstraintSymbol(decl.name, statement.kind, family, self.place(decl.span)))
-            case syntax.Discrete():
+            case syntax.DiscreteStatement():
                 events.discrete(self, statement)
 
     def _enter_unknown(
-        self, decl: syntax.Decl, kind: str, family: Family, dimension: Dimension, domain: DomainSymbol | None, co: bool
+        self,
+        decl: syntax.Decl,
+        kind: str,
+        family: NameFamily,
+        dimension: Dimension,
+        domain: DomainSymbol | None,
+        co: bool,
     ) -> None:
         self.enter(UnknownSymbol(decl.name, kind, family, dimension, domain, co, self.place(decl.span)))
 
-    def _nodes(self, statement: syntax.Node) -> None:
+    def _nodes(self, statement: syntax.NodeStatement) -> None:
         """Nodes, and the members of a bundle of them."""
         bundle = self.scope.find(statement.domain.name)
         if isinstance(bundle, BundleSymbol):
@@ -131,7 +141,7 @@ class Declarations(Parameters):
         self.parts.nodes.append(NodeFamily(family.name, family.whole, domain, place))
         return NodeSymbol(name, family, domain, place)
 
-    def _coordinates(self, statement: syntax.Coord) -> None:
+    def _coordinates(self, statement: syntax.CoordStatement) -> None:
         """Coordinates with their rates and conjugates; cocoord: momenta are the positions."""
         domain = self.domain(statement.domain)
         co = statement.kind == "cocoord"
@@ -151,11 +161,11 @@ class Declarations(Parameters):
         """The value with which what a declaration names begins; nothing where the name is another's (E106)."""
         match statement:
             # `coord x: translation = 1 m`
-            case syntax.Coord() | syntax.Implicit() | syntax.Node():
+            case syntax.CoordStatement() | syntax.ImplicitStatement() | syntax.NodeStatement():
                 init, decls = statement.init, statement.decls
             # `state s = 1 m`
-            case syntax.State(decl=decl, value=value) if value is not None:
-                init, decls = syntax.Initial("fixed", value, value.span), (decl,)
+            case syntax.StateStatement(decl=decl, value=value) if value is not None:
+                init, decls = syntax.InitialValue("fixed", value, value.span), (decl,)
             # nothing else begins with a value
             case _:
                 return
@@ -177,7 +187,7 @@ class Declarations(Parameters):
             self._own_initial(decl, kind, symbol.family, dimension, init)
 
     def _own_initial(
-        self, decl: syntax.Decl, kind: str, family: Family, dimension: Dimension, init: syntax.Initial
+        self, decl: syntax.Decl, kind: str, family: NameFamily, dimension: Dimension, init: syntax.InitialValue
     ) -> None:
         """The initial value in a declaration: for all elements of the family, in a `for` for those of its variables."""
         message = f"'{decl.name}' is in {dim.show(dimension)} but starts at {{}}"
@@ -190,7 +200,7 @@ class Declarations(Parameters):
             target = ex.var(family.name, kind, *family.prefix, *at)
             for one, value, loops in self.values_at_start(target, init.value, dimension, message, outer):
                 fixed, unit = init.kind == "fixed", si(dimension).text
-                self.add_initial(Initial(one, value, fixed, loops, self.place(init.span), unit=unit))
+                self.add_initial(InitialCondition(one, value, fixed, loops, self.place(init.span), unit=unit))
 
     def values_at_start(
         self, target: Node, written: syntax.Expr, dimension: Dimension, message: str, outer: int
@@ -213,7 +223,7 @@ class Declarations(Parameters):
             value = self.resolver.fitting(item, written, dimension, "E207", message)
             yield ex.substitute(target, at), ex.substitute(value, at), loops[:outer]
 
-    def add_initial(self, initial: Initial, override: bool = False) -> None:
+    def add_initial(self, initial: InitialCondition, override: bool = False) -> None:
         """Enter an initial value; override: of a scene.  What stands further outside goes before (language, 34)."""
         path = self.current.path
         initial = replace(initial, depth=0 if override else 2 + path.count(".") if path else 1)
@@ -225,7 +235,7 @@ class Declarations(Parameters):
             raise Failed
         self.parts.initials.append(initial)
 
-    def _state(self, statement: syntax.State) -> None:
+    def _state(self, statement: syntax.StateStatement) -> None:
         """A dynamic variable; its unit is said, or that of its initial value."""
         decl = statement.decl
         unit = self.unit(statement.unit) if statement.unit else None
@@ -237,11 +247,13 @@ class Declarations(Parameters):
         self._enter_unknown(decl, "s", family, unit.dimension, None, False)
         self.parts.states.append(State(family.name, family.whole, unit, self.place(decl.span)))
 
-    def _definition(self, statement: syntax.Let | syntax.Output | syntax.Quasi) -> None:
+    def _definition(self, statement: syntax.LetStatement | syntax.OutputStatement | syntax.QuasiStatement) -> None:
         """let, output, quasi: resolved when they are read first."""
         decl = statement.decl
-        kind = {syntax.Let: "let", syntax.Output: "output", syntax.Quasi: "quasi"}[type(statement)]
-        dimension = self.unit(statement.unit).dimension if isinstance(statement, syntax.Quasi) else None
+        kind = {syntax.LetStatement: "let", syntax.OutputStatement: "output", syntax.QuasiStatement: "quasi"}[
+            type(statement)
+        ]
+        dimension = self.unit(statement.unit).dimension if isinstance(statement, syntax.QuasiStatement) else None
         at: tuple[str, ...] = ()
         implied = False
         # `for i in 1..n { let x[i] = ... }`: a formula with loop variables
@@ -281,4 +293,6 @@ class Declarations(Parameters):
 
 def _takes_its_unit(statement: syntax.Statement) -> bool:
     """Whether a declaration has no unit but that of its value."""
-    return isinstance(statement, syntax.Discrete) or (isinstance(statement, syntax.State) and statement.unit is None)
+    return isinstance(statement, syntax.DiscreteStatement) or (
+        isinstance(statement, syntax.StateStatement) and statement.unit is None
+    )

@@ -26,10 +26,10 @@ from sysdyn.values import dataclass
 
 
 @dataclass(frozen=True, slots=True)
-class Given:
+class GivenInput:
     """What a scene or the command line gives to the input of a component."""
 
-    statement: syntax.Set
+    statement: syntax.SetStatement
     source: SourceText
 
 
@@ -40,11 +40,11 @@ class Inputs(Elements):
         super().__init__(report)
         self.space: Space  # of the model
         self.files: FileScope
-        self.given_inputs: dict[str, Given] = {}  # by path
+        self.given_inputs: dict[str, GivenInput] = {}  # by path
         self.taken_inputs: set[str] = set()  # those of them that were found
         self.moved: frozenset[str] = frozenset()  # names and paths of inputs that an analysis moves
 
-    def model_input(self, statement: syntax.Input) -> None:
+    def model_input(self, statement: syntax.InputStatement) -> None:
         """An input of the model itself: a scene may set it."""
         decl = statement.decl
         unit = self.unit(statement.unit)
@@ -119,7 +119,9 @@ class Inputs(Elements):
                         return False
         return True
 
-    def bind_inputs(self, s: syntax.Instance, space: Space, head: Interface, inputs: dict[str, syntax.Expr]) -> None:
+    def bind_inputs(
+        self, s: syntax.InstanceStatement, space: Space, head: Interface, inputs: dict[str, syntax.Expr]
+    ) -> None:
         """The inputs of a component: what its user gives them, a scene or the command line in its place, a default."""
         sight, around = self.resolver.sight(), self.resolver.loops
         for name, statement in head.inputs.items():
@@ -143,7 +145,7 @@ class Inputs(Elements):
             )
             space.scope.symbols[name] = definition if space.prefix else self._with_move(definition, path, unit)
 
-    def _give(self, name: str, unit: Unit, shape: Shape, inside: Space, given: Given) -> None:
+    def _give(self, name: str, unit: Unit, shape: Shape, inside: Space, given: GivenInput) -> None:
         """What a scene or the command line gives, read in the scope of the model."""
         self.taken_inputs.add(inside.family(name).name)
         model = self.space
@@ -173,11 +175,11 @@ def bare(it: Inputs, value: syntax.Expr, dimension: Dimension) -> syntax.Expr:
     inner = value.operand if isinstance(value, syntax.Negative) else value
     if it.resolver.source is it.space.source or not isinstance(inner, syntax.Number) or not dimension:
         return value
-    number = syntax.Quantity(inner.value, inner.text, _si_unit(dimension, inner.span), inner.span)
+    number = syntax.QuantityLiteral(inner.value, inner.text, _si_unit(dimension, inner.span), inner.span)
     it.files.scope.units.update({f"SI {dim.show(dimension)}": si(dimension)})
     return syntax.Negative(number, value.span) if isinstance(value, syntax.Negative) else number
 
 
-def _si_unit(dimension: Dimension, span: syntax.Span) -> syntax.Unit:
+def _si_unit(dimension: Dimension, span: syntax.Span) -> syntax.UnitExpression:
     name = f"SI {dim.show(dimension)}"
-    return syntax.Unit((syntax.UnitFactor(name, 1, ".", span),), name, span)
+    return syntax.UnitExpression((syntax.UnitFactor(name, 1, ".", span),), name, span)

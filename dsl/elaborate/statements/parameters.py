@@ -22,9 +22,9 @@ from sysdyn.dsl.text.diagnostics import Place, Related
 from sysdyn.dsl.tree import syntax
 from sysdyn.values import dataclass
 
-Valued = TypeVar("Valued", syntax.Param, syntax.State | syntax.Discrete)
+Valued = TypeVar("Valued", syntax.ParamStatement, syntax.StateStatement | syntax.DiscreteStatement)
 """A declaration with a value."""
-Stated = tuple[syntax.Param, tuple[syntax.For, ...]]
+Stated = tuple[syntax.ParamStatement, tuple[syntax.ForStatement, ...]]
 
 
 @dataclass(frozen=True, slots=True)
@@ -37,7 +37,7 @@ class Argument:
     place: Place
 
 
-class Parameters(ElaborationContext):
+class ParameterDeclarations(ElaborationContext):
     """Declares parameters."""
 
     def declare_parameters(self, body: Body, given: dict[str, Argument]) -> None:
@@ -57,8 +57,8 @@ class Parameters(ElaborationContext):
     def _first(self, body: Body) -> dict[str, Stated]:
         """The parameters of a body by their names; E106 where there are two of one."""
         found: dict[str, Stated] = {}
-        for statement, loops in body.statements_of(syntax.Param):
-            assert isinstance(statement, syntax.Param)
+        for statement, loops in body.statements_of(syntax.ParamStatement):
+            assert isinstance(statement, syntax.ParamStatement)
             name = statement.decl.name
             if name in found:
                 related = (Related("first declared here", self.place(found[name][0].decl.span)),)
@@ -70,8 +70,8 @@ class Parameters(ElaborationContext):
         return found
 
     def by_dependence(
-        self, found: dict[str, tuple[Valued, tuple[syntax.For, ...]]]
-    ) -> tuple[tuple[Valued, tuple[syntax.For, ...]], ...]:
+        self, found: dict[str, tuple[Valued, tuple[syntax.ForStatement, ...]]]
+    ) -> tuple[tuple[Valued, tuple[syntax.ForStatement, ...]], ...]:
         """Declarations by name, those that others name before these; E105."""
         needs = {name: _names_in(*stated) & found.keys() for name, stated in found.items()}
         order, circles = in_order(found, lambda name: sorted(needs[name]))
@@ -82,7 +82,7 @@ class Parameters(ElaborationContext):
             self.scope.broken |= set(circle)
         return tuple(found[name] for name in order)
 
-    def _parameter(self, statement: syntax.Param, given: Argument | None) -> None:
+    def _parameter(self, statement: syntax.ParamStatement, given: Argument | None) -> None:
         """Declare a parameter: its unit, shape and values, by the argument of the instance or else its default; E207 of
         neither.
         """
@@ -117,7 +117,7 @@ class Parameters(ElaborationContext):
 
     def _values(
         self,
-        statement: syntax.Param,
+        statement: syntax.ParamStatement,
         written: syntax.Expr,
         value: Typed | Vector,
         unit: Unit | None,
@@ -145,7 +145,7 @@ class Parameters(ElaborationContext):
             if item.dimension is not None and item.dimension != dimension:
                 literal = written.operand if isinstance(written, syntax.Negative) else written
                 have, want = dim.show(item.dimension), dim.show(dimension)
-                have = literal.unit.text if isinstance(literal, syntax.Quantity) else have
+                have = literal.unit.text if isinstance(literal, syntax.QuantityLiteral) else have
                 is_ = "dimensionless" if have == "dimensionless" else f"in {have}"
                 message = f"'{statement.decl.name}' is declared {want} but its {what} is {is_}"
                 if unit is None:
@@ -177,13 +177,13 @@ class Parameters(ElaborationContext):
     def _default_unit(self, value: syntax.Expr, dimension: Dimension) -> Unit:
         if isinstance(value, syntax.Negative):
             value = value.operand
-        if isinstance(value, syntax.Quantity):
+        if isinstance(value, syntax.QuantityLiteral):
             found = read_unit(value.unit, self.scope, self.resolver.source, self.report)
             if found is not None:
                 return found
         return si(dimension)
 
-    def _is_run_constant(self, node: Node, statement: syntax.Param, given: Argument | None) -> None:
+    def _is_run_constant(self, node: Node, statement: syntax.ParamStatement, given: Argument | None) -> None:
         discretes = self.parts.discretes
         for inner in ex.topological([node]):
             assigned = inner.op == "param" and inner.data in discretes
@@ -193,7 +193,7 @@ class Parameters(ElaborationContext):
                 vary = f"numbers and parameters alone; {varies}"
                 raise self._wrong("E807", message, statement, given, help=None if given is None else vary)
 
-    def _is_of_constants(self, body: Body, statement: syntax.Param, given: bool) -> None:
+    def _is_of_constants(self, body: Body, statement: syntax.ParamStatement, given: bool) -> None:
         """E807: a default that names what the body declares beside parameters, all of which are known before it."""
         if given or statement.value is None:
             return
@@ -202,7 +202,9 @@ class Parameters(ElaborationContext):
         if not names:
             return
         own = {n.index.name for n in walk(statement.value) if isinstance(n, syntax.Reduction)}
-        others = {d.name for other, _ in body if not isinstance(other, syntax.Param) for d in declarations_of(other)}
+        others = {
+            d.name for other, _ in body if not isinstance(other, syntax.ParamStatement) for d in declarations_of(other)
+        }
         for name in names:
             if name.name in others - own - self.resolver.sight().keys():
                 what = statement.decl.name
@@ -211,7 +213,7 @@ class Parameters(ElaborationContext):
                 raise self.resolver.fail("E807", message, name.span, help=help_)
 
     def _wrong(
-        self, code: str, message: str, statement: syntax.Param, given: Argument | None, help: str | None
+        self, code: str, message: str, statement: syntax.ParamStatement, given: Argument | None, help: str | None
     ) -> Failed:
         """Report an error in a default, or in what an instance gives instead; raise what is returned."""
         if given is None:
@@ -220,7 +222,10 @@ class Parameters(ElaborationContext):
         return self.resolver.fail(code, message, given.place, help=help, related=(where,))
 
 
-def _names_in(statement: syntax.Param | syntax.State | syntax.Discrete, loops: tuple[syntax.For, ...]) -> set[str]:
+def _names_in(
+    statement: syntax.ParamStatement | syntax.StateStatement | syntax.DiscreteStatement,
+    loops: tuple[syntax.ForStatement, ...],
+) -> set[str]:
     """What a declaration reads, with the loops around it."""
     bounds = [bound for loop in loops for bound in (loop.lower, loop.upper)]
     roots: list[object] = [statement.value, *statement.decl.indices, *bounds]

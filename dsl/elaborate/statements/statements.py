@@ -11,7 +11,16 @@ from sysdyn.dsl.elaborate.statements.declarations import Declarations
 from sysdyn.dsl.model import dimensions as dim
 from sysdyn.dsl.model import expression as ex
 from sysdyn.dsl.model.expression import Node
-from sysdyn.dsl.model.network import Constraint, Dynamic, Energy, Expectation, Golden, Initial, Loop, Work
+from sysdyn.dsl.model.network import (
+    Constraint,
+    Dynamic,
+    EnergyTerm,
+    Expectation,
+    Golden,
+    InitialCondition,
+    Loop,
+    VirtualWork,
+)
 from sysdyn.dsl.model.quasi import NotLinearError, virtual
 from sysdyn.dsl.model.units import NONE, Dimension, multiply, si
 from sysdyn.dsl.names.failures import Failed
@@ -23,7 +32,7 @@ from sysdyn.dsl.tree import syntax
 class Statements(Declarations):
     """Resolves statements of a space."""
 
-    def constraint(self, s: syntax.Constraint) -> None:
+    def constraint(self, s: syntax.ConstraintStatement) -> None:
         """phi, psi, gamma."""
         place = self.place(s.span)
         # a psi constrains flows: dx/dt there may be a quasi-velocity
@@ -74,25 +83,25 @@ class Statements(Declarations):
             raise self.resolver.fail("E208", message, expression.span, help=help_)
         return value.node
 
-    def _energy(self, s: syntax.Energy) -> None:
+    def _energy(self, s: syntax.EnergyStatement) -> None:
         node = self._wants(f"energy {s.function}", s.value, dim.ENERGY)
-        self.add_statement(Energy(s.function, node, self.resolver.loops, self.place(s.span)))
+        self.add_statement(EnergyTerm(s.function, node, self.resolver.loops, self.place(s.span)))
 
-    def _content(self, s: syntax.Content) -> None:
+    def _content(self, s: syntax.ContentStatement) -> None:
         node = self._wants(f"content {s.function}", s.value, dim.POWER)
         loops, place = self.resolver.loops, self.place(s.span)
         if s.function != "D":
-            self.add_statement(Energy(s.function, node, loops, place))
+            self.add_statement(EnergyTerm(s.function, node, loops, place))
             return
         for part, inside in _parts(node, loops):
-            self.add_statement(Energy("D", friction.set_valued(self, part, inside, place), inside, place))
+            self.add_statement(EnergyTerm("D", friction.set_valued(self, part, inside, place), inside, place))
 
-    def _work(self, s: syntax.Work) -> None:
+    def _work(self, s: syntax.WorkStatement) -> None:
         """Add `work F on x`: F delta x is energy (E208); along a quasi-coordinate its part on each displacement."""
         effort = self.resolver.scalar(s.effort)
-        quasi = isinstance(s.on, syntax.Call) and s.on.name == "quasi"
+        quasi = isinstance(s.on, syntax.FunctionCall) and s.on.name == "quasi"
         # `work M on quasi(w)`: on what has a rate and no displacement
-        if isinstance(s.on, syntax.Call) and quasi:
+        if isinstance(s.on, syntax.FunctionCall) and quasi:
             on = self._quasi(s.on)
         else:
             on = self.resolver.scalar(s.on)
@@ -108,9 +117,11 @@ class Statements(Declarations):
                 raise self.resolver.fail("E208", message, s.effort.span, help=help_)
         along = self.virtual(on.node, "quasi(w): w", s.on.span) if quasi else ((ex.const(1.0), on.node),)
         for coefficient, node in along:
-            self.add_statement(Work(ex.mul(effort.node, coefficient), node, self.resolver.loops, self.place(s.span)))
+            self.add_statement(
+                VirtualWork(ex.mul(effort.node, coefficient), node, self.resolver.loops, self.place(s.span))
+            )
 
-    def _quasi(self, on: syntax.Call) -> Typed:
+    def _quasi(self, on: syntax.FunctionCall) -> Typed:
         """The quasi-velocity w of quasi(w), in the dimension of the displacement along it."""
         if len(on.args) != 1 or on.args[0].name is not None:
             raise self.resolver.fail("E206", f"quasi takes one argument, {len(on.args)} given", on.span)
@@ -145,7 +156,7 @@ class Statements(Declarations):
             message, help_ = f"{acts} on {states}, which no effort moves", "a coord, or a term in the state's dynamic"
             raise self.resolver.fail("E319", message, where.span, help=help_)
 
-    def _dynamic(self, s: syntax.Dynamic) -> None:
+    def _dynamic(self, s: syntax.DynamicStatement) -> None:
         """Add `dynamic s' = ...`, the rate of a state; E508 where it is not the first derivative of one, or reads other
         rates.
         """
@@ -175,14 +186,14 @@ class Statements(Declarations):
                 raise self.resolver.fail("E508", message, s.value.span, help=help_)
         self.parts.dynamics.append(Dynamic(value.node, node, self.resolver.loops, self.place(s.span)))
 
-    def initial(self, s: syntax.Init, override: bool = False) -> None:
+    def initial(self, s: syntax.InitStatement, override: bool = False) -> None:
         """`init ref = value`, in a model or (override) in a scene."""
         outer = len(self.resolver.loops)
         with ExitStack() as stack:
             target = self._loop_over_slice(s.target, stack)
             self.in_parts(lambda: self._initial(s, target, override, outer), s.span)
 
-    def _initial(self, s: syntax.Init, target_syntax: syntax.Expr, override: bool, outer: int) -> None:
+    def _initial(self, s: syntax.InitStatement, target_syntax: syntax.Expr, override: bool, outer: int) -> None:
         """Add an `init` of what a target means, each element with its value; override: by the scene, in place of the
         model's.
         """
@@ -203,7 +214,7 @@ class Statements(Declarations):
                 message = f"the initial value of '{one}' depends on '{inner}'"
                 raise self.resolver.fail("E807", message, s.initial.value.span, help="parameters and constants only")
             fixed = s.initial.kind == "fixed"
-            begun = Initial(one, value, fixed, loops, self.place(s.span), unit=si(dimension).text)
+            begun = InitialCondition(one, value, fixed, loops, self.place(s.span), unit=si(dimension).text)
             self.add_initial(begun, override)
 
     def _loop_over_slice(self, target: syntax.Expr, stack: ExitStack) -> syntax.Expr:
@@ -239,12 +250,12 @@ class Statements(Declarations):
                 return syntax.Item(target, tuple(names), target.span)
         return target
 
-    def require(self, s: syntax.Require) -> None:
+    def require(self, s: syntax.RequireStatement) -> None:
         """`require condition`."""
         node = self.resolver.condition(s.condition)
         self.parts.requirements.append(Requirement(node, self.resolver.loops, self.place(s.span), s.condition))
 
-    def expect(self, s: syntax.Expect) -> None:
+    def expect(self, s: syntax.ExpectStatement) -> None:
         """`expect`, in a model or in a scene."""
         moment = s.moment or "always"
         at = None
@@ -272,23 +283,23 @@ class Statements(Declarations):
         """The author's text of a span on one line."""
         return " ".join(self.resolver.source.text[span.start : span.end].split())
 
-    def golden(self, s: syntax.Golden) -> None:
+    def golden(self, s: syntax.GoldenStatement) -> None:
         """`expect golden`, in a model or in a scene."""
         within = self.resolver.scalar_of(s.within, NONE, "E208", "expect golden: within is a ratio, {} found")
         self.parts.goldens.append(Golden(s.file, within, self.place(s.span)))
 
 
 STATEMENTS: dict[type, Callable[..., None]] = {
-    syntax.Energy: Statements._energy,
-    syntax.Content: Statements._content,
-    syntax.Work: Statements._work,
-    syntax.Dynamic: Statements._dynamic,
-    syntax.Init: Statements.initial,
-    syntax.Require: Statements.require,
-    syntax.Expect: Statements.expect,
-    syntax.Golden: Statements.golden,
-    syntax.When: events.when,
-    syntax.Every: events.every,
+    syntax.EnergyStatement: Statements._energy,
+    syntax.ContentStatement: Statements._content,
+    syntax.WorkStatement: Statements._work,
+    syntax.DynamicStatement: Statements._dynamic,
+    syntax.InitStatement: Statements.initial,
+    syntax.RequireStatement: Statements.require,
+    syntax.ExpectStatement: Statements.expect,
+    syntax.GoldenStatement: Statements.golden,
+    syntax.WhenStatement: events.when,
+    syntax.EveryStatement: events.every,
 }
 
 
