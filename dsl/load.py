@@ -29,10 +29,10 @@ from sysdyn.dsl.names.failures import Failed
 from sysdyn.dsl.names.resolve import Resolver
 from sysdyn.dsl.names.symbols import Space, nearest
 from sysdyn.dsl.parser.parse import parse
-from sysdyn.dsl.rules import bound_values, checks, graph_checks, laws
-from sysdyn.dsl.rules.asked import TextConditions
+from sysdyn.dsl.rules import bound_values, checks, graph_checks, law_rules
 from sysdyn.dsl.rules.claims import exact_claims
 from sysdyn.dsl.rules.floating import floating
+from sysdyn.dsl.rules.text_conditions import TextConditions
 from sysdyn.dsl.text.diagnostics import Diagnostic, Place, Report, SourceText
 from sysdyn.dsl.tree import syntax
 from sysdyn.values import dataclass
@@ -168,7 +168,7 @@ def _build_network(
         floating(elaborator, reader.observations, report)
     # laws are judged on the finished network, in which alike sizes have one name
     found = with_literal_ranges(with_common_sizes(_result(elaborator, reader, read_scene)), known.number)
-    laws.run(found, known, report)
+    law_rules.run(found, known, report)
     return None if report.failed or _incomplete(report) else found
 
 

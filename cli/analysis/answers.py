@@ -11,11 +11,11 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from sysdyn.cli.analysis.asked import Found
-from sysdyn.cli.analysis.linear import Linearisation, linearise
+from sysdyn.cli.analysis.linearisation import Linearisation, linearise
+from sysdyn.cli.analysis.operating_point import Found
 from sysdyn.cli.analysis.states import state_of
 from sysdyn.cli.page.columns import align, complex_text
-from sysdyn.cli.run.request.asked import RunRequest
+from sysdyn.cli.run.request.run_request import RunRequest
 from sysdyn.dsl.model import expression as ex
 from sysdyn.dsl.model.units import si_text
 from sysdyn.dsl.text.diagnostics import Report

@@ -7,11 +7,11 @@ from dataclasses import field, replace
 from typing import Any
 
 import numpy as np
-from sysdyn.cli.analysis.asked import Found, compile_target, of_nodes
-from sysdyn.cli.analysis.linear import linearise, loose_of
+from sysdyn.cli.analysis.linearisation import linearise, loose_of
+from sysdyn.cli.analysis.operating_point import Found, compile_target, of_nodes
 from sysdyn.cli.analysis.states import model_at_rest, resting
 from sysdyn.cli.page.columns import complex_text
-from sysdyn.cli.run.request.asked import RunRequest
+from sysdyn.cli.run.request.run_request import RunRequest
 from sysdyn.cli.run.request.targets import still
 from sysdyn.dsl.model.units import Unit, quantity
 from sysdyn.dsl.text.diagnostics import Report

@@ -6,10 +6,17 @@ from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
-from sysdyn.cli.analysis.asked import Found, Inputs, compile_target, model_at_instant, model_at_start, of_contents
+from sysdyn.cli.analysis.operating_point import (
+    Found,
+    Inputs,
+    compile_target,
+    model_at_instant,
+    model_at_start,
+    of_contents,
+)
 from sysdyn.cli.run.events import plan
 from sysdyn.cli.run.prepare import Prepared
-from sysdyn.cli.run.request.asked import RunRequest
+from sysdyn.cli.run.request.run_request import RunRequest
 from sysdyn.cli.run.request.targets import Target
 from sysdyn.dsl.text.diagnostics import Report
 from sysdyn.runtime.events.plan import Plan

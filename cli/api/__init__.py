@@ -20,15 +20,15 @@ from sysdyn.api.linear import Linearised, NoState, linearised_at, resting
 from sysdyn.cli.analysis.resting import Equilibrium
 from sysdyn.cli.failures import UsageError
 from sysdyn.cli.run.check.checking import check_target
-from sysdyn.cli.run.many.loaded import Loaded, shortly, text_of
+from sysdyn.cli.run.many.reusable_model import Loaded, shortly, text_of
 from sysdyn.cli.run.request import targets
-from sysdyn.cli.run.request.asked import RunRequest
+from sysdyn.cli.run.request.run_request import RunRequest
 from sysdyn.cli.run.running import Ran, run
 from sysdyn.cli.sweep.one_run import Runner
-from sysdyn.cli.sweep.opened import Sweep
+from sysdyn.cli.sweep.sweep_results import Sweep
 from sysdyn.distribution import warn_of_other
-from sysdyn.dsl import alone
 from sysdyn.dsl import load as load_
+from sysdyn.dsl import unused_components
 from sysdyn.dsl.model import expression as ex
 from sysdyn.dsl.text.diagnostics import Diagnostic, ModelError, Report
 from sysdyn.dsl.text.source import SourceText
@@ -246,7 +246,7 @@ def check(text: str, name: str = "<text>") -> list[Diagnostic]:
     for target in targets.all_targets(document, report):
         with ex.fresh():
             check_target(target, report)
-    for _, own in alone.check_unused_components(document):
+    for _, own in unused_components.check_unused_components(document):
         report.extend(own)
     return list(report.diagnostics)
 

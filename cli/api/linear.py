@@ -5,14 +5,14 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
-from sysdyn.cli.analysis import linear as linear_
+from sysdyn.cli.analysis import linearisation as linear_
 from sysdyn.cli.analysis.answers import Answer, answers
-from sysdyn.cli.analysis.files import arrays
-from sysdyn.cli.analysis.linear import inputs_of, linearise
+from sysdyn.cli.analysis.linear_files import arrays
+from sysdyn.cli.analysis.linearisation import inputs_of, linearise
 from sysdyn.cli.analysis.resting import Equilibrium, equilibria
 from sysdyn.cli.analysis.states import state_of
 from sysdyn.cli.failures import UsageError
-from sysdyn.cli.run.request.asked import RunRequest
+from sysdyn.cli.run.request.run_request import RunRequest
 from sysdyn.dsl.model import expression as ex
 from sysdyn.dsl.text.diagnostics import ModelError, Report
 

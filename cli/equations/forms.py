@@ -5,10 +5,10 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 import numpy as np
-from sysdyn.cli.analysis.asked import model_at_start
-from sysdyn.cli.analysis.linear import inputs_of, linearise
+from sysdyn.cli.analysis.linearisation import inputs_of, linearise
+from sysdyn.cli.analysis.operating_point import model_at_start
 from sysdyn.cli.run.prepare import Prepared
-from sysdyn.cli.run.request.asked import RunRequest
+from sysdyn.cli.run.request.run_request import RunRequest
 from sysdyn.cli.run.request.targets import Target
 from sysdyn.compiler.equations.book import (
     CO_WORDS,

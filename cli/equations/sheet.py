@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 
+from sysdyn.cli.equations.expression_writers import ExpressionWriter, Latex, TextWriter
 from sysdyn.cli.equations.forms import FormContent
 from sysdyn.cli.equations.letters import Letters
-from sysdyn.cli.equations.writing import ExpressionWriter, Latex, TextWriter
 from sysdyn.compiler.equations.book import (
     CO_WORDS,
     REFLECTED,

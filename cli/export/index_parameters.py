@@ -7,8 +7,8 @@ from __future__ import annotations
 
 import numpy as np
 from sysdyn.cli.export.binding_json import parameters
-from sysdyn.cli.export.layout import Formed
 from sysdyn.cli.export.tables import ExportTables
+from sysdyn.cli.export.tabulation import Formed
 from sysdyn.compiler.binding.following import Following
 from sysdyn.compiler.forms.descriptor import DescriptorForm
 from sysdyn.dsl.model.calculus import derivative

@@ -9,8 +9,8 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from sysdyn.cli.export.layout import Formed
 from sysdyn.cli.export.tables import ExportTables
+from sysdyn.cli.export.tabulation import Formed
 from sysdyn.compiler.binding.manifest import family_entry, where
 from sysdyn.compiler.model.mirror import family_name, letter, word
 from sysdyn.dsl.text.diagnostics import Place

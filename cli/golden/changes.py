@@ -9,7 +9,7 @@ from html import escape
 
 from sysdyn.cli.compare.diffing import differences, headline, table
 from sysdyn.cli.golden.book import GoldenScene
-from sysdyn.cli.golden.checking import Case, load_golden, tolerance_of
+from sysdyn.cli.golden.golden_checks import Case, load_golden, tolerance_of
 from sysdyn.cli.golden.recording import GoldenRecord
 from sysdyn.cli.golden.structures import describe_change
 from sysdyn.cli.page.document import document

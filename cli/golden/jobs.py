@@ -7,7 +7,7 @@ from collections.abc import Callable, Iterator, Sequence
 
 from sysdyn.cli.failures import UsageError
 from sysdyn.cli.golden.book import GoldenScene
-from sysdyn.cli.golden.checking import INPUT_OUTPUT, SOLVER, Case, Mutant, check, mutate, request_of
+from sysdyn.cli.golden.golden_checks import INPUT_OUTPUT, SOLVER, Case, Mutant, check, mutate, request_of
 from sysdyn.cli.golden.recording import GoldenRecord, Refused, record
 from sysdyn.cli.golden.runs import Stopped
 from sysdyn.cli.run.many.crew import Lost, each

@@ -18,7 +18,7 @@ from sysdyn.cli.compare.diffing import common, differences, sentence
 from sysdyn.cli.failures import OF_RUNS
 from sysdyn.cli.golden.runs import APART, GoldenRun, Stopped, between, run
 from sysdyn.cli.run.many.crew import Lost, each
-from sysdyn.cli.run.request.asked import RunRequest
+from sysdyn.cli.run.request.run_request import RunRequest
 from sysdyn.runtime.comparison.arrays import Arrays
 from sysdyn.runtime.comparison.curve import Curve, Flags, Floats, bernstein, cells_at
 from sysdyn.runtime.comparison.thinning import estimated_rates, rounded, thinned

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from sysdyn.cli.failures import OF_CLAIMS, OF_RUNS
 from sysdyn.cli.run.request import targets
-from sysdyn.cli.run.request.asked import RunRequest, options_of
+from sysdyn.cli.run.request.run_request import RunRequest, options_of
 from sysdyn.cli.run.running import Ran, integrate, ready
 from sysdyn.cli.run.start.starting import as_written
 from sysdyn.compiler.model import energies

@@ -155,7 +155,7 @@ def found(name: str, unsaved: dict[str, str]) -> Checked:
 
 def accounts(name: str) -> Accounts:
     """What `sysdyn list` tells of each model of a file that has no errors."""
-    from sysdyn.cli.manual import names
+    from sysdyn.cli.manual import model_names
     from sysdyn.dsl import load
     from sysdyn.dsl.model import expression as ex
 
@@ -166,7 +166,7 @@ def accounts(name: str) -> Accounts:
             with ex.fresh():
                 listing = load.listing(document, model, None, Report())
                 if listing is not None:
-                    told[model.name.name] = names.account(document, model, listing)
+                    told[model.name.name] = model_names.account(document, model, listing)
     except Exception:  # the check has said why
         return {}
     return told

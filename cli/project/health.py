@@ -152,7 +152,7 @@ def _runs() -> Iterator[HealthFinding]:
 
 def _run(backend: str) -> HealthFinding:
     """A swing of three seconds by one backend against its closed form."""
-    from sysdyn.cli.run.request.asked import RunRequest
+    from sysdyn.cli.run.request.run_request import RunRequest
     from sysdyn.cli.run.running import run
     from sysdyn.dsl.text.diagnostics import Report
 

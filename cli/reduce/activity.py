@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 from sysdyn.cli.report.balance import BalancePart, add_observations, shares
 from sysdyn.cli.run.prepare import prepare
-from sysdyn.cli.run.request.asked import RunRequest, of_these_alone, options_of
+from sysdyn.cli.run.request.run_request import RunRequest, of_these_alone, options_of
 from sysdyn.cli.run.request.targets import Target
 from sysdyn.cli.run.running import Ran, integrate, ready
 from sysdyn.dsl.model import expression as ex

@@ -19,7 +19,7 @@ from sysdyn.cli.failures import UsageError
 from sysdyn.cli.reduce import edits
 from sysdyn.cli.reduce.activity import Activities, activities
 from sysdyn.cli.run.request import targets
-from sysdyn.cli.run.request.asked import ACCURACY, RunRequest, check_tolerances, options_of
+from sysdyn.cli.run.request.run_request import ACCURACY, RunRequest, check_tolerances, options_of
 from sysdyn.cli.run.request.targets import Target
 from sysdyn.cli.run.running import Ran, integrate, ready
 from sysdyn.cli.trade.errors import error_of

@@ -9,10 +9,10 @@ from dataclasses import replace
 
 from sysdyn.cli.failures import UsageError
 from sysdyn.cli.report.balance import Share, add_observations, shares
-from sysdyn.cli.report.study import ReportStudy, sources_of
+from sysdyn.cli.report.report_study import ReportStudy, sources_of
 from sysdyn.cli.run.prepare import Prepared, prepare
 from sysdyn.cli.run.request import targets
-from sysdyn.cli.run.request.asked import RunRequest, check_tolerances, of_these_alone, options_of
+from sysdyn.cli.run.request.run_request import RunRequest, check_tolerances, of_these_alone, options_of
 from sysdyn.cli.run.request.targets import Target
 from sysdyn.cli.run.running import Ran, integrate
 from sysdyn.cli.run.start.starting import start

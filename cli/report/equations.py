@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from sysdyn.cli.equations import typeset
-from sysdyn.cli.report.study import ReportStudy
+from sysdyn.cli.report.report_study import ReportStudy
 from sysdyn.compiler.equations.algebra import Algebra
 from sysdyn.compiler.equations.book import WORDS, algebra_of, equations
 from sysdyn.compiler.equations.book import functions as state_functions

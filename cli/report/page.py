@@ -5,7 +5,7 @@ from __future__ import annotations
 from sysdyn.cli.page.document import document, escape
 from sysdyn.cli.page.plots import SCRIPT, figures, hint
 from sysdyn.cli.report import balance, equations, paynter, run, schematic, text
-from sysdyn.cli.report.study import ReportStudy
+from sysdyn.cli.report.report_study import ReportStudy
 
 
 def page(study: ReportStudy) -> str:

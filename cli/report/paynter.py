@@ -5,7 +5,7 @@ from __future__ import annotations
 from sysdyn.cli.equations.mathml import Typesetter, math, mi, mo, row
 from sysdyn.cli.page.document import escape, table
 from sysdyn.cli.report.balance import author_name
-from sysdyn.cli.report.study import ReportStudy
+from sysdyn.cli.report.report_study import ReportStudy
 from sysdyn.dsl.model.expression import var
 from sysdyn.dsl.model.network import Branch
 from sysdyn.runtime.model.description import BESIDE, count

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 from sysdyn.cli.page.document import escape, table
-from sysdyn.cli.report.study import ReportStudy
+from sysdyn.cli.report.report_study import ReportStudy
 from sysdyn.cli.run.start.author import names_of
 from sysdyn.cli.run.start.starting import changes_by_start
 from sysdyn.compiler.binding.certificate import certificate

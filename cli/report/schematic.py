@@ -12,7 +12,7 @@ from dataclasses import dataclass, field
 from sysdyn.cli.page.document import escape
 from sysdyn.cli.page.panels import COLOURS
 from sysdyn.cli.report.layout import places
-from sysdyn.cli.report.study import ReportStudy
+from sysdyn.cli.report.report_study import ReportStudy
 from sysdyn.dsl.model.expression import Node, topological
 from sysdyn.dsl.model.network import Branch, Loop, Shape, Terminal
 from sysdyn.dsl.text.diagnostics import Place

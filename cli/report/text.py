@@ -6,7 +6,7 @@ import re
 
 from sysdyn.cli.page.document import escape
 from sysdyn.cli.page.source_text import highlight
-from sysdyn.cli.report.study import ReportStudy
+from sysdyn.cli.report.report_study import ReportStudy
 from sysdyn.dsl.text.source import SourceText
 
 

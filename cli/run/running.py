@@ -15,7 +15,15 @@ from sysdyn.cli.run.many.memory import keep_pages
 from sysdyn.cli.run.module_check import check_module
 from sysdyn.cli.run.prepare import Prepared, prepare
 from sysdyn.cli.run.request import lock, targets
-from sysdyn.cli.run.request.asked import RunRequest, check_tolerances, default_output, options_of, rest, stops, turning
+from sysdyn.cli.run.request.run_request import (
+    RunRequest,
+    check_tolerances,
+    default_output,
+    options_of,
+    rest,
+    stops,
+    turning,
+)
 from sysdyn.cli.run.request.targets import Target
 from sysdyn.cli.run.start.flat_laws import impossible
 from sysdyn.cli.run.start.starting import Started, start

@@ -8,14 +8,14 @@ from dataclasses import dataclass, field
 
 from sysdyn.cli.spice.calls import CircuitCalls, call
 from sysdyn.cli.spice.circuit import GROUND, Circuit, Netlist
-from sysdyn.cli.spice.controlled import CONTROLLED
+from sysdyn.cli.spice.controlled_sources import CONTROLLED
 from sysdyn.cli.spice.devices import PLAIN, CircuitScope, DeviceText
+from sysdyn.cli.spice.initial_conditions import across_sources, held_nodes
 from sysdyn.cli.spice.instances import CircuitInstance, CircuitInstances
 from sysdyn.cli.spice.local_components import LOCAL
 from sysdyn.cli.spice.netlist import Card, UnreadableCard, pairs, value
 from sysdyn.cli.spice.scene_text import scene
 from sysdyn.cli.spice.semiconductors import SEMICONDUCTORS
-from sysdyn.cli.spice.starts import across_sources, held_nodes
 from sysdyn.cli.spice.temperature import Heat
 from sysdyn.cli.spice.windings import Cores, component, coupled_coils
 from sysdyn.cli.spice.writing import NetlistNames, names, quantity, wrap_lines

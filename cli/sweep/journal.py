@@ -15,7 +15,7 @@ from typing import Self
 
 from sysdyn.cli import whole_files
 from sysdyn.cli.failures import UsageError
-from sysdyn.cli.sweep.kept import Done, Item, Kept, KeptRuns
+from sysdyn.cli.sweep.run_records import Done, Item, Kept, KeptRuns
 from sysdyn.runtime.model.failures import TraceError
 
 

@@ -20,9 +20,9 @@ from typing import Any
 
 from sysdyn.cli.failures import UsageError
 from sysdyn.cli.run.many.crew import DEATHS
-from sysdyn.cli.run.request.asked import RunRequest
-from sysdyn.cli.sweep.kept import Item, Kept
+from sysdyn.cli.run.request.run_request import RunRequest
 from sysdyn.cli.sweep.one_run import Runner, Task
+from sysdyn.cli.sweep.run_records import Item, Kept
 from sysdyn.cli.sweep.workers import Answer, Chunk, Queue, answer
 from sysdyn.dsl.text.source import real
 

@@ -9,12 +9,12 @@ from typing import Any
 
 import numpy as np
 from sysdyn.cli.failures import UsageError
-from sysdyn.cli.run.many.loaded import Loaded
-from sysdyn.cli.run.request.asked import RunRequest
+from sysdyn.cli.run.many.reusable_model import Loaded
+from sysdyn.cli.run.request.run_request import RunRequest
 from sysdyn.cli.run.running import Ran, finding
 from sysdyn.cli.sweep.axes import CHOICES
-from sysdyn.cli.sweep.in_core import Cases, thin_instants
-from sysdyn.cli.sweep.kept import Item, Kept
+from sysdyn.cli.sweep.core_cases import Cases, thin_instants
+from sysdyn.cli.sweep.run_records import Item, Kept
 from sysdyn.cli.sweep.study import Case
 from sysdyn.dsl.text.diagnostics import ModelError, Report
 from sysdyn.runtime.many.asked import NotApplicableError

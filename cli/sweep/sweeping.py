@@ -15,19 +15,19 @@ import numpy as np
 from sysdyn import __version__
 from sysdyn.cli.failures import plain
 from sysdyn.cli.run.request import lock
-from sysdyn.cli.run.request.asked import RunRequest, instants_of, model_digest
+from sysdyn.cli.run.request.run_request import RunRequest, instants_of, model_digest
 from sysdyn.cli.run.request.targets import Target
 from sysdyn.cli.sweep import results
 from sysdyn.cli.sweep.axes import CHOICES, Axis, Evaluate, axis
 from sysdyn.cli.sweep.journal import SweepJournal
-from sysdyn.cli.sweep.kept import Done, Item, Kept
 from sysdyn.cli.sweep.one_run import Runner, Task
+from sysdyn.cli.sweep.run_records import Done, Item, Kept
 from sysdyn.cli.sweep.study import Case, SweepStudy
 from sysdyn.cli.sweep.workers import results as worked
 from sysdyn.dsl import load
 from sysdyn.dsl.model import expression as ex
 from sysdyn.dsl.model.units import si_text
-from sysdyn.dsl.rules.asked import REFUSED
+from sysdyn.dsl.rules.text_conditions import REFUSED
 from sysdyn.dsl.text.diagnostics import ModelError, Report
 from sysdyn.runtime.trace.claim import claimed
 from sysdyn.runtime.trace.opening import destination

@@ -17,9 +17,9 @@ from itertools import islice
 from multiprocessing.connection import Connection
 
 from sysdyn.cli.run.many.crew import DEATHS, Crew, Serve
-from sysdyn.cli.run.request.asked import RunRequest
-from sysdyn.cli.sweep.kept import Item, Kept
+from sysdyn.cli.run.request.run_request import RunRequest
 from sysdyn.cli.sweep.one_run import Runner, Task
+from sysdyn.cli.sweep.run_records import Item, Kept
 from sysdyn.values import dataclass
 
 FIRST, LARGEST = 8, 1024

@@ -10,10 +10,10 @@ from collections.abc import Iterator, Sequence
 from pathlib import Path
 
 from sysdyn.cli.run.many.crew import Lost, as_ready
-from sysdyn.cli.run.request.asked import RunRequest
+from sysdyn.cli.run.request.run_request import RunRequest
 from sysdyn.cli.trade.measuring import Limits, bench_of
 from sysdyn.cli.trade.search import FIRST, TradeSearch, tolerance
-from sysdyn.cli.trade.traded import Combination, Measured, Runs
+from sysdyn.cli.trade.trade_results import Combination, Measured, Runs
 from sysdyn.runtime.trace.trace import Trace
 from sysdyn.values import dataclass
 

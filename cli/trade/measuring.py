@@ -19,13 +19,13 @@ from sysdyn.cli.failures import OF_CLAIMS, UsageError
 from sysdyn.cli.options import TRIED
 from sysdyn.cli.run.prepare import Prepared
 from sysdyn.cli.run.request import targets
-from sysdyn.cli.run.request.asked import ACCURACY, RunRequest, options_of
+from sysdyn.cli.run.request.run_request import ACCURACY, RunRequest, options_of
 from sysdyn.cli.run.request.targets import Target
 from sysdyn.cli.run.running import Ran, begin, finding, ready, run_from
 from sysdyn.cli.run.start.starting import Started
 from sysdyn.cli.trade import work
 from sysdyn.cli.trade.errors import error_of
-from sysdyn.cli.trade.traded import INDICES, Combination, Measured, RefusedCombination
+from sysdyn.cli.trade.trade_results import INDICES, Combination, Measured, RefusedCombination
 from sysdyn.dsl.model import expression as ex
 from sysdyn.dsl.model.network import Network
 from sysdyn.dsl.text.diagnostics import Diagnostic, Report

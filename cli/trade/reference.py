@@ -13,10 +13,10 @@ from contextlib import closing
 from pathlib import Path
 
 from sysdyn.cli.run.many.crew import Beside
-from sysdyn.cli.run.request.asked import RunRequest
+from sysdyn.cli.run.request.run_request import RunRequest
 from sysdyn.cli.trade.errors import error_of
 from sysdyn.cli.trade.measuring import Bench, Limits, Said, bench_of
-from sysdyn.cli.trade.traded import Combination, TradeReference
+from sysdyn.cli.trade.trade_results import Combination, TradeReference
 from sysdyn.cli.verify.agreement import horizon
 from sysdyn.runtime.accuracy.laws import LAWS
 from sysdyn.runtime.trace.trace import Trace

@@ -13,14 +13,14 @@ from pathlib import Path
 from sysdyn.cli.failures import UsageError
 from sysdyn.cli.run.many.crew import company
 from sysdyn.cli.run.request import targets
-from sysdyn.cli.run.request.asked import RunRequest, check_tolerances
+from sysdyn.cli.run.request.run_request import RunRequest, check_tolerances
 from sysdyn.cli.trade import work
 from sysdyn.cli.trade.ahead import MeasurementRequest, ahead
-from sysdyn.cli.trade.journal import journal as journal_of
 from sysdyn.cli.trade.measuring import Bench, Limits
 from sysdyn.cli.trade.reference import reference
 from sysdyn.cli.trade.search import FIRST, TradeSearch, tolerance
-from sysdyn.cli.trade.traded import Combination, Measured, RefusedCombination, Runs, Traded
+from sysdyn.cli.trade.trade_journal import journal as journal_of
+from sysdyn.cli.trade.trade_results import Combination, Measured, RefusedCombination, Runs, Traded
 from sysdyn.dsl.text.diagnostics import Report
 
 SECONDS = 300.0
@@ -51,7 +51,7 @@ def trade(
 ) -> Traded | None:
     """Measure; None where the report says why the scene cannot run.  Raises NoReference.
 
-    A trade that was stopped goes on where it was (journal.py).
+    A trade that was stopped goes on where it was (trade_journal.py).
     full: every combination at every tolerance; budget [s] of wall time for all; jobs: processes that make runs ahead;
     None: where it pays, which it does not where the search leaves most combinations out.
     """

@@ -21,12 +21,12 @@ from sysdyn.cli.options import EVERY
 from sysdyn.cli.run.many.crew import Lost, each
 from sysdyn.cli.run.prepare import Prepared
 from sysdyn.cli.run.request import targets
-from sysdyn.cli.run.request.asked import ACCURACY, RunRequest, check_tolerances, options_of
+from sysdyn.cli.run.request.run_request import ACCURACY, RunRequest, check_tolerances, options_of
 from sysdyn.cli.run.request.targets import Target
 from sysdyn.cli.run.running import Ran, finding, integrate, ready
 from sysdyn.cli.verify.agreement import Bounds, Gap, gaps, horizon
 from sysdyn.cli.verify.twins import Twins, free_quantities, twins
-from sysdyn.cli.verify.verified import RefusedFormulation, Verified, VerifiedRun, disagreements, worst
+from sysdyn.cli.verify.verify_results import RefusedFormulation, Verified, VerifiedRun, disagreements, worst
 from sysdyn.dsl.model import expression as ex
 from sysdyn.dsl.text.diagnostics import Diagnostic, Report
 from sysdyn.runtime.accuracy.options import Options

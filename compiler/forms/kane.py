@@ -23,8 +23,8 @@ from sysdyn.compiler.forms.speeds import LARGEST, Speeds, definition, kinematics
 from sysdyn.compiler.model.energies import EnergyModel, Row, UnknownFamily
 from sysdyn.compiler.model.terms import Nest, counter, local_variables
 from sysdyn.dsl.model.calculus import derivative, signals_held
+from sysdyn.dsl.model.connected_components import Joined
 from sysdyn.dsl.model.expression import Node, add, const, is_const, mul, neg, substitute, topological, var, variables
-from sysdyn.dsl.model.joined import Joined
 from sysdyn.dsl.model.network import loop_ranges
 from sysdyn.dsl.text.diagnostics import Diagnostic, ModelError
 from sysdyn.values import dataclass

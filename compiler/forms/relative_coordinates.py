@@ -22,6 +22,7 @@ from sysdyn.compiler.forms.momenta import coordinates_with_inertia
 from sysdyn.compiler.model.energies import EnergyModel, UnknownFamily, reading, tangible
 from sysdyn.compiler.model.terms import Nest, has_reduction, local_variables, vanishes
 from sysdyn.dsl.model.calculus import derivative, differential
+from sysdyn.dsl.model.connected_components import Joined
 from sysdyn.dsl.model.expression import (
     Node,
     add,
@@ -36,7 +37,6 @@ from sysdyn.dsl.model.expression import (
     variables,
 )
 from sysdyn.dsl.model.expression_text import to_text
-from sysdyn.dsl.model.joined import Joined
 from sysdyn.values import dataclass
 
 

@@ -13,7 +13,7 @@ from collections.abc import Iterator, Sequence
 from operator import itemgetter
 
 from sysdyn.compiler.network.skeleton import Shaped, shape_of
-from sysdyn.dsl.model.joined import Joined
+from sysdyn.dsl.model.connected_components import Joined
 from sysdyn.dsl.model.network import Branch, Network, Terminal
 from sysdyn.values import dataclass
 

@@ -13,8 +13,8 @@ from sysdyn.compiler.network.primal.bounds import WholeNumbers
 from sysdyn.compiler.network.primal.cycles import in_loops
 from sysdyn.compiler.network.quadratures import Wanted, is_position, quadrature, stores_of, whole
 from sysdyn.dsl.model import expression as ex
+from sysdyn.dsl.model.connected_components import Joined
 from sysdyn.dsl.model.expression import Node
-from sysdyn.dsl.model.joined import Joined
 from sysdyn.dsl.model.network import InitialCondition, Loop, Network, NodeFamily, State, Terminal
 from sysdyn.dsl.model.rewriting import TRACED, expressions, rewritten
 from sysdyn.dsl.text.diagnostics import ModelError, Place

@@ -14,7 +14,7 @@ from collections import Counter
 from collections.abc import Collection, Iterator, Mapping, Sequence
 
 from sysdyn.compiler.network.neighbourhoods import RUN, BranchSequence, FamilyLaws, Found, Site
-from sysdyn.dsl.model.joined import Joined
+from sysdyn.dsl.model.connected_components import Joined
 from sysdyn.dsl.model.network import Branch, Network
 from sysdyn.values import dataclass
 

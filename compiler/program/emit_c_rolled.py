@@ -10,7 +10,7 @@ from collections.abc import Callable, Container, Iterable, Iterator, Sequence
 from itertools import groupby
 
 from sysdyn.compiler.program.program import ROWS_A_ROUTINE, Program, Routine, Statement, StoreInstruction
-from sysdyn.compiler.program.rolled import (
+from sysdyn.compiler.program.rerolling import (
     ALIKE,
     LARGE,
     SHARED,

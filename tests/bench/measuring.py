@@ -13,7 +13,7 @@ from pathlib import Path
 import numpy as np
 from sysdyn.cli.run.events import plan
 from sysdyn.cli.run.request import targets
-from sysdyn.cli.run.request.asked import RunRequest, options_of, stops
+from sysdyn.cli.run.request.run_request import RunRequest, options_of, stops
 from sysdyn.cli.run.request.sizes import sizes
 from sysdyn.cli.run.running import ready, rest
 from sysdyn.cli.run.start.starting import start

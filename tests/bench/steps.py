@@ -26,7 +26,7 @@ import numpy as np
 sys.path.insert(0, str(Path(__file__).parent))
 from measuring import MODELS
 from sysdyn.cli.run.request import targets
-from sysdyn.cli.run.request.asked import RunRequest, options_of
+from sysdyn.cli.run.request.run_request import RunRequest, options_of
 from sysdyn.cli.run.running import ready
 from sysdyn.cli.run.start.starting import start
 from sysdyn.dsl.model import expression as ex

@@ -13,9 +13,9 @@ import time
 from pathlib import Path
 
 import numpy as np
-from sysdyn.cli.run.many.loaded import Loaded
-from sysdyn.cli.run.request.asked import RunRequest
-from sysdyn.cli.sweep.in_core import Cases
+from sysdyn.cli.run.many.reusable_model import Loaded
+from sysdyn.cli.run.request.run_request import RunRequest
+from sysdyn.cli.sweep.core_cases import Cases
 from sysdyn.dsl.text.diagnostics import Report
 from sysdyn.runtime.many.asked import NotApplicableError
 

@@ -19,9 +19,9 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from sysdyn.cli.run.request.asked import RunRequest
+from sysdyn.cli.run.request.run_request import RunRequest
 from sysdyn.cli.run.running import run
-from sysdyn.cli.trade.traded import cheapest
+from sysdyn.cli.trade.trade_results import cheapest
 from sysdyn.cli.trade.trading import trade
 from sysdyn.dsl.text.diagnostics import Report
 

@@ -6,9 +6,9 @@ import re
 import pytest
 import sympy
 from printed_equations import SEED, Values, model, printed
-from sysdyn.cli.analysis.asked import compile_target
+from sysdyn.cli.analysis.operating_point import compile_target
 from sysdyn.cli.main import run
-from sysdyn.cli.run.request.asked import RunRequest
+from sysdyn.cli.run.request.run_request import RunRequest
 from sysdyn.compiler.equations import matrices
 from sysdyn.compiler.equations.algebra import Algebra
 from sysdyn.compiler.equations.book import classes

@@ -9,7 +9,7 @@ from sysdyn import api
 from sysdyn.cli.analysis import resting
 from sysdyn.cli.main import run
 from sysdyn.cli.progress import SEARCH, ProgressLine
-from sysdyn.cli.run.request.asked import RunRequest
+from sysdyn.cli.run.request.run_request import RunRequest
 from sysdyn.dsl.text.diagnostics import Report
 from sysdyn.runtime.linear import rest
 from texts import ROOT, run_json, write

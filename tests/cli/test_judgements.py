@@ -9,9 +9,9 @@ import pytest
 from sysdyn.cli.report import balance
 from sysdyn.cli.run.start.starting import holds
 from sysdyn.cli.run.verdict.expectations import judge, watch
-from sysdyn.cli.sweep.kept import Done, Kept, KeptRuns
 from sysdyn.cli.sweep.results import write
-from sysdyn.cli.verify.verified import Verified, VerifiedRun, disagreements, worst
+from sysdyn.cli.sweep.run_records import Done, Kept, KeptRuns
+from sysdyn.cli.verify.verify_results import Verified, VerifiedRun, disagreements, worst
 from sysdyn.dsl import load
 from sysdyn.dsl.model import expression as ex
 from sysdyn.dsl.model.evaluation import evaluate

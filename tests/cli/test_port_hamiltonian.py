@@ -5,9 +5,9 @@ import json
 
 import numpy as np
 import pytest
-from sysdyn.cli.analysis.asked import compile_target
+from sysdyn.cli.analysis.operating_point import compile_target
 from sysdyn.cli.main import run
-from sysdyn.cli.run.request.asked import RunRequest
+from sysdyn.cli.run.request.run_request import RunRequest
 from sysdyn.compiler.equations.matrices import NoSuchEquations, rows_of
 from sysdyn.compiler.equations.port_hamiltonian import port_hamiltonian
 from sysdyn.compiler.forms.momenta import momentum

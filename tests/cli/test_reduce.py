@@ -13,7 +13,7 @@ from sysdyn.cli.reduce import activity
 from sysdyn.cli.reduce.activity import variation
 from sysdyn.cli.reduce.sankey import flows
 from sysdyn.cli.run.request import targets
-from sysdyn.cli.run.request.asked import RunRequest
+from sysdyn.cli.run.request.run_request import RunRequest
 from sysdyn.dsl.text.diagnostics import Report
 from sysdyn.runtime.comparison.arrays import arrays_of
 from sysdyn.runtime.comparison.compare import compare

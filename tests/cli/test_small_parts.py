@@ -24,7 +24,7 @@ from sysdyn.cli.spice.writing import UnreadableCard
 from sysdyn.cli.streams import Closed, standing_streams
 from sysdyn.cli.trade import work
 from sysdyn.cli.trade.errors import error_of
-from sysdyn.compiler.binding.sampled import Points, Sample
+from sysdyn.compiler.binding.sampled_rows import Points, Sample
 from sysdyn.dsl.text.diagnostics import Report
 from sysdyn.dsl.text.source import SourceText
 from sysdyn.runtime.comparison.arrays import Arrays

@@ -14,11 +14,11 @@ import pytest
 from sysdyn import api
 from sysdyn.cli.failures import UsageError
 from sysdyn.cli.main import run
-from sysdyn.cli.run.request.asked import RunRequest
+from sysdyn.cli.run.request.run_request import RunRequest
 from sysdyn.cli.sweep import workers
 from sysdyn.cli.sweep.axes import Axis, axis
 from sysdyn.cli.sweep.journal import SweepJournal
-from sysdyn.cli.sweep.kept import Kept
+from sysdyn.cli.sweep.run_records import Kept
 from sysdyn.cli.sweep.study import study
 from texts import LADDER
 

@@ -9,9 +9,9 @@ import h5py
 import numpy as np
 import pytest
 from sysdyn.cli.main import run
-from sysdyn.cli.run.many.loaded import Loaded
-from sysdyn.cli.run.request.asked import RunRequest
-from sysdyn.cli.sweep.in_core import Cases
+from sysdyn.cli.run.many.reusable_model import Loaded
+from sysdyn.cli.run.request.run_request import RunRequest
+from sysdyn.cli.sweep.core_cases import Cases
 from sysdyn.cli.sweep.one_run import Runner
 from sysdyn.dsl.text.diagnostics import Report
 from sysdyn.runtime.many.asked import NotApplicableError

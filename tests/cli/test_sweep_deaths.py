@@ -16,10 +16,10 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 from sysdyn.api import load
-from sysdyn.cli.run.request.asked import RunRequest
+from sysdyn.cli.run.request.run_request import RunRequest
 from sysdyn.cli.sweep import workers
-from sysdyn.cli.sweep.kept import Kept
 from sysdyn.cli.sweep.one_run import Runner
+from sysdyn.cli.sweep.run_records import Kept
 from sysdyn.cli.sweep.workers import answer
 
 LONG = bool(os.environ.get("SYSDYN_LONG"))

@@ -20,10 +20,10 @@ from schema import NUMBER, conforms, envelope
 from scipy.integrate import solve_ivp
 from sysdyn import api
 from sysdyn.cli.main import run
-from sysdyn.cli.run.request.asked import RunRequest
+from sysdyn.cli.run.request.run_request import RunRequest
 from sysdyn.cli.run.running import run as simulate
 from sysdyn.cli.trade.search import tolerance
-from sysdyn.cli.trade.traded import Combination, Measured, cheapest, frontier
+from sysdyn.cli.trade.trade_results import Combination, Measured, cheapest, frontier
 from sysdyn.cli.trade.trading import trade
 from sysdyn.dsl.text.diagnostics import Report
 from sysdyn.runtime.trace.trace import Trace

@@ -13,7 +13,7 @@ from pathlib import Path
 import pytest
 from sysdyn.cli.compare.diffing import common, differences, headline
 from sysdyn.cli.run.request import targets
-from sysdyn.cli.run.request.asked import RunRequest
+from sysdyn.cli.run.request.run_request import RunRequest
 from sysdyn.cli.run.request.sizes import sizes
 from sysdyn.cli.run.running import Ran, run
 from sysdyn.cli.verify.twins import free_quantities

@@ -4,9 +4,9 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from sysdyn.cli.run.many.loaded import Loaded
-from sysdyn.cli.run.request.asked import RunRequest
-from sysdyn.compiler.binding.again import again
+from sysdyn.cli.run.many.reusable_model import Loaded
+from sysdyn.cli.run.request.run_request import RunRequest
+from sysdyn.compiler.binding.rebinding import again
 from sysdyn.dsl.model import expression as ex
 
 MODELS = Path(__file__).parents[2] / "models"

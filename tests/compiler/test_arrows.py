@@ -6,11 +6,11 @@ from catalogue import ONE, PLACE
 from networks import ELECTRICAL, TRANSLATION, Net, compiled, matched, of, poles
 from sysdyn.compiler.network.along import along
 from sysdyn.compiler.network.dead_branches import dead_branches
+from sysdyn.compiler.network.floating_parts import add_references
 from sysdyn.compiler.network.influence import influences_on, links
 from sysdyn.compiler.network.quadratures import massive
 from sysdyn.compiler.network.skeleton import fill_shape, shape_of
-from sysdyn.compiler.network.stated import ALL, as_elements
-from sysdyn.compiler.network.ungrounded import add_references
+from sysdyn.compiler.network.written_energies import ALL, as_elements
 from sysdyn.dsl.model import expression as x
 from sysdyn.dsl.model.evaluation import evaluate
 from sysdyn.dsl.model.network import Dynamic, EnergyTerm, State

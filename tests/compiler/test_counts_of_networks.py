@@ -13,8 +13,8 @@ from sysdyn.compiler.network.primal.contents import held_at
 from sysdyn.compiler.network.primal.incidence import Incidence
 from sysdyn.compiler.network.primal.series import series
 from sysdyn.dsl.model import expression as x
+from sysdyn.dsl.model.connected_components import Joined
 from sysdyn.dsl.model.evaluation import evaluate
-from sysdyn.dsl.model.joined import Joined
 from sysdyn.dsl.model.network import Loop
 
 pytestmark = pytest.mark.usefixtures("fresh")

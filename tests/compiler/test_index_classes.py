@@ -21,7 +21,7 @@ from sysdyn.compiler.network.primal.cycles import in_loops
 from sysdyn.compiler.network.primal.incidence import elements
 from sysdyn.compiler.network.primal.index_classes import IndexClasses, Link, LinkEnd
 from sysdyn.dsl.model import expression as x
-from sysdyn.dsl.model.joined import Joined
+from sysdyn.dsl.model.connected_components import Joined
 from sysdyn.dsl.text.diagnostics import ModelError
 
 pytestmark = pytest.mark.usefixtures("fresh")

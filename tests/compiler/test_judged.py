@@ -19,9 +19,9 @@ from sysdyn.compiler.network.primal.bounds import WholeNumbers
 from sysdyn.compiler.network.primal.contents import Contents
 from sysdyn.compiler.network.primal.incidence import Incidence
 from sysdyn.compiler.network.primal.reading import EliminationTable, IndexBox, Rewriter, touches_network
-from sysdyn.compiler.network.primal.unspecified import guess_contents
+from sysdyn.compiler.network.primal.store_guesses import guess_contents
 from sysdyn.compiler.pipeline import compile_network
-from sysdyn.compiler.program.rolled import skeleton
+from sysdyn.compiler.program.rerolling import skeleton
 from sysdyn.dsl.model import expression as x
 from sysdyn.dsl.model.evaluation import evaluate
 from sysdyn.dsl.model.network import Constraint, EnergyTerm, InitialCondition, Loop, Unknown, VirtualWork

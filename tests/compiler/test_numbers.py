@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from catalogue import ONE, PLACE
 from chains import blank, coordinate, parameter
-from sysdyn.compiler.binding.sampled import Points, SampledRows
+from sysdyn.compiler.binding.sampled_rows import Points, SampledRows
 from sysdyn.compiler.binding.sensitivity import Sensitivity
 from sysdyn.compiler.model.integers import Index, Integers
 from sysdyn.compiler.model.magnitudes import magnitudes, rounding

@@ -10,9 +10,9 @@ from sysdyn.compiler.forms.assembly import Assembly
 from sysdyn.compiler.forms.descriptor import EquationFamily, Unknowns
 from sysdyn.compiler.forms.integration import integrate
 from sysdyn.compiler.forms.lowering import total_rate, whole
+from sysdyn.compiler.forms.meters.default_traces import MOST, with_coordinates_observed
 from sysdyn.compiler.forms.meters.ledgers import Entry, ledgers
 from sysdyn.compiler.forms.meters.observing import InitialEquation, add_initials, missing, pins_and_equations
-from sysdyn.compiler.forms.meters.untraced import MOST, with_coordinates_observed
 from sysdyn.compiler.model.energies import EnergyModel, InitialTarget, Row, UnknownFamily, energies
 from sysdyn.compiler.model.terms import Term
 from sysdyn.compiler.network.authors import in_author_names, owner, split_finding

@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from sysdyn.cli.run.request import targets
-from sysdyn.cli.run.request.asked import RunRequest
+from sysdyn.cli.run.request.run_request import RunRequest
 from sysdyn.cli.run.running import ready
 from sysdyn.compiler.binding.pulses import pulses
 from sysdyn.dsl.model import expression as ex

@@ -18,7 +18,7 @@ from sysdyn.dsl.names.names import STATICS, NameResolver, pick
 from sysdyn.dsl.names.quantities import OF_ELEMENTS
 from sysdyn.dsl.names.reactions import ledger, reaction
 from sysdyn.dsl.names.symbols import Typed, Vector
-from sysdyn.dsl.rules import laws
+from sysdyn.dsl.rules import law_rules
 from sysdyn.dsl.text.diagnostics import Report, SourceText
 
 TEXT = """
@@ -295,7 +295,7 @@ def test_notes_on_loops_of_stores_wait_until_laws_are_right():
 
 def told_of(network):
     report = Report()
-    laws.run(network, Values(network.parameters, []), report)
+    law_rules.run(network, Values(network.parameters, []), report)
     return [d.code for d in report]
 
 

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from sysdyn import api
 from sysdyn.cli.run import running
-from sysdyn.cli.run.request.asked import RunRequest
+from sysdyn.cli.run.request.run_request import RunRequest
 from sysdyn.dsl.text.diagnostics import Report
 
 AGAIN = """model again {

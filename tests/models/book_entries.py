@@ -5,8 +5,8 @@ from dataclasses import dataclass
 import numpy as np
 from reduced import ROOT
 from reference_values import load
-from sysdyn.cli.analysis.asked import compile_target, model_at_start
-from sysdyn.cli.run.request.asked import RunRequest
+from sysdyn.cli.analysis.operating_point import compile_target, model_at_start
+from sysdyn.cli.run.request.run_request import RunRequest
 from sysdyn.compiler.binding.oracle import Oracle
 from sysdyn.dsl.text.diagnostics import Report
 

@@ -11,7 +11,7 @@ from collections import Counter
 from reduced import ROOT
 from sysdyn.cli.options import EVERY
 from sysdyn.cli.run.request import targets
-from sysdyn.cli.run.request.asked import RunRequest
+from sysdyn.cli.run.request.run_request import RunRequest
 from sysdyn.cli.run.running import ready
 from sysdyn.cli.run.start.starting import start
 from sysdyn.dsl import load

@@ -10,8 +10,8 @@ from book_entries import begin, filled, solution, state
 from capabilities import RC, REFERENCES, counts, entries, meets
 from model_runs import trace_of
 from reduced import ROOT
-from sysdyn.cli.analysis.asked import compile_target
-from sysdyn.cli.run.request.asked import RunRequest
+from sysdyn.cli.analysis.operating_point import compile_target
+from sysdyn.cli.run.request.run_request import RunRequest
 from sysdyn.compiler.binding.oracle import Oracle
 from sysdyn.compiler.model.mirror import letter
 from sysdyn.dsl.model import expression as ex

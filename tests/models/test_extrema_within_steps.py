@@ -2,10 +2,10 @@
 
 import numpy as np
 import pytest
-from sysdyn.cli.run.many.loaded import Loaded
-from sysdyn.cli.run.request.asked import RunRequest
-from sysdyn.cli.sweep.kept import KeptRuns
+from sysdyn.cli.run.many.reusable_model import Loaded
+from sysdyn.cli.run.request.run_request import RunRequest
 from sysdyn.cli.sweep.one_run import Runner
+from sysdyn.cli.sweep.run_records import KeptRuns
 
 OSCILLATOR = """\
 model m {

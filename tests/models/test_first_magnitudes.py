@@ -5,7 +5,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from sysdyn.api import simulate
-from sysdyn.cli.run.request.asked import RunRequest
+from sysdyn.cli.run.request.run_request import RunRequest
 from sysdyn.cli.run.running import run
 from sysdyn.dsl.text.diagnostics import Report
 from sysdyn.runtime.accuracy import runs

@@ -7,7 +7,7 @@ from reference_values import load
 from scipy.integrate import solve_ivp
 from sysdyn.api import simulate
 from sysdyn.cli.main import run as main
-from sysdyn.cli.run.request.asked import RunRequest
+from sysdyn.cli.run.request.run_request import RunRequest
 from sysdyn.cli.run.running import run
 from sysdyn.dsl.text.diagnostics import Report
 from sysdyn.runtime.trace.trace import Trace

@@ -3,12 +3,12 @@
 import numpy as np
 import pytest
 from start_strategies import prepared_start
-from sysdyn.cli.analysis.linear import linearise
+from sysdyn.cli.analysis.linearisation import linearise
 from sysdyn.cli.analysis.states import state_of
 from sysdyn.cli.export.starts import start_tables
 from sysdyn.cli.export.tables import assembly_tables
 from sysdyn.cli.run.events import plan
-from sysdyn.cli.run.request.asked import RunRequest
+from sysdyn.cli.run.request.run_request import RunRequest
 from sysdyn.cli.run.verdict.culprit import undefined_at_start
 from sysdyn.dsl.text.diagnostics import Report
 from sysdyn.runtime.integrate.rows.bare import by_sums, shows

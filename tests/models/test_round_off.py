@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from model_runs import trace_of
 from sysdyn.cli import main
-from sysdyn.cli.run.request.asked import RunRequest
+from sysdyn.cli.run.request.run_request import RunRequest
 from sysdyn.cli.run.running import run
 from sysdyn.dsl.text.diagnostics import Report
 from sysdyn.runtime.start import start

@@ -12,7 +12,7 @@ import pytest
 from changed import CHANGED, EXTREME, STIFF
 from reduced import ROOT, solution
 from reference_values import load
-from sysdyn.cli.run.request.asked import RunRequest
+from sysdyn.cli.run.request.run_request import RunRequest
 from sysdyn.cli.run.running import run
 from sysdyn.dsl.text.diagnostics import Report
 from sysdyn.runtime.trace.trace import Trace

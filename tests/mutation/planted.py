@@ -22,7 +22,7 @@ import numpy as np
 from sysdyn.cli.run import module_check, running
 from sysdyn.cli.run.prepare import Prepared
 from sysdyn.cli.run.request import targets
-from sysdyn.cli.run.request.asked import RunRequest, options_of
+from sysdyn.cli.run.request.run_request import RunRequest, options_of
 from sysdyn.cli.run.request.targets import Target
 from sysdyn.cli.run.running import integrate, ready
 from sysdyn.compiler.program import build

@@ -16,7 +16,7 @@ sys.path.insert(0, str(Path(__file__).parents[1] / "compiler"))
 
 from catalogue import ONE, PLACE
 from chains import blank, coordinate
-from sysdyn.cli.run.generated import module_of
+from sysdyn.cli.run.numpy_module import module_of
 from sysdyn.cli.run.prepare import Prepared
 from sysdyn.compiler.pipeline import compile_network
 from sysdyn.dsl.model import expression as x

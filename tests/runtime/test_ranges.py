@@ -5,7 +5,7 @@ import pytest
 from scipy.integrate import solve_ivp
 from sysdyn import api
 from sysdyn.cli.run import running
-from sysdyn.cli.run.request.asked import RunRequest
+from sysdyn.cli.run.request.run_request import RunRequest
 from sysdyn.dsl.text.diagnostics import Report
 
 RISE = """model rise {

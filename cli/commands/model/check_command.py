@@ -135,8 +135,8 @@ def _form(console: Console, chosen: str | None, files: tuple[str, ...]) -> None:
     if chosen == "json":
         console.as_json = True
         return
-    from sysdyn.cli.page import findings
+    from sysdyn.cli.page import finding_formats
 
     # junit alone needs the names of files: those without findings pass
-    forms = {"concise": findings.concise, "github": findings.github, "sarif": findings.sarif}
-    console.format = forms.get(chosen) or (lambda found, plain: findings.junit(found, plain, files))
+    forms = {"concise": finding_formats.concise, "github": finding_formats.github, "sarif": finding_formats.sarif}
+    console.format = forms.get(chosen) or (lambda found, plain: finding_formats.junit(found, plain, files))

@@ -9,7 +9,7 @@ from sysdyn.cli.console import Console, with_console
 from sysdyn.cli.failures import SOLVER
 from sysdyn.cli.options import chosen
 from sysdyn.cli.progress import SEARCH
-from sysdyn.cli.run.request.asked import RunRequest
+from sysdyn.cli.run.request.run_request import RunRequest
 
 
 @with_console("equilibrium")

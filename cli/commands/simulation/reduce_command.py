@@ -15,7 +15,7 @@ from sysdyn.cli.page.columns import align
 from sysdyn.cli.reduce.activity import Activities
 from sysdyn.cli.reduce.reduction import Cost, ReducedModel, reduce
 from sysdyn.cli.report.balance import WORDS
-from sysdyn.cli.run.request.asked import RunRequest
+from sysdyn.cli.run.request.run_request import RunRequest
 
 KINDS = (".png", ".svg")
 BAR = 24

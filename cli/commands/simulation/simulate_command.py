@@ -16,7 +16,7 @@ from sysdyn.cli.page.columns import spent
 from sysdyn.cli.progress import ProgressLine
 
 if TYPE_CHECKING:
-    from sysdyn.cli.run.request.asked import RunRequest
+    from sysdyn.cli.run.request.run_request import RunRequest
     from sysdyn.cli.run.running import Ran
 
 SHOWN = 4
@@ -29,7 +29,7 @@ SHOWN = 4
 @click.option("--no-timings", is_flag=True, help="Leave wall and CPU times out of the trace.")
 def command(console: Console, progress: str, no_timings: bool, **options: Any) -> int:
     """Simulate a scene of FILE and write its trace."""
-    from sysdyn.cli.run.request.asked import RunRequest
+    from sysdyn.cli.run.request.run_request import RunRequest
     from sysdyn.cli.run.running import run
     from sysdyn.cli.run.start.starting import change_lines, first_lines, strategy_note
 

@@ -12,10 +12,10 @@ from sysdyn.cli.failures import UsageError, worst
 from sysdyn.cli.options import chosen, solved
 from sysdyn.cli.page.columns import align
 from sysdyn.cli.run.many.crew import cores
-from sysdyn.cli.run.request.asked import RunRequest, default_output
-from sysdyn.cli.sweep.in_core import KEEPS
-from sysdyn.cli.sweep.kept import Kept
+from sysdyn.cli.run.request.run_request import RunRequest, default_output
+from sysdyn.cli.sweep.core_cases import KEEPS
 from sysdyn.cli.sweep.one_run import Runner
+from sysdyn.cli.sweep.run_records import Kept
 from sysdyn.cli.sweep.study import SAMPLES, read, study
 from sysdyn.cli.sweep.sweeping import Swept, axes_of, summary, sweep, to_json
 from sysdyn.runtime.trace.opening import replaceable
@@ -106,7 +106,7 @@ def _show_results(console: Console, found: Swept, plot: str | None) -> int:
     console.result = to_json(found)
     console.results(_table(found))
     if plot is not None:
-        from sysdyn.cli.sweep.picture import picture
+        from sysdyn.cli.sweep.sweep_picture import picture
 
         whole_files.write(plot, picture(found, Path(plot).suffix[1:]))
     resumed = f", {found.resumed} of them from before" if found.resumed else ""

@@ -16,11 +16,11 @@ from sysdyn.cli.failures import SOLVER, UsageError
 from sysdyn.cli.options import scene_command, side_by_side
 from sysdyn.cli.page.columns import align, fit_columns, refusals, terminal
 from sysdyn.cli.run.request import lock, targets
-from sysdyn.cli.run.request.asked import RunRequest, instants_of
+from sysdyn.cli.run.request.run_request import RunRequest, instants_of
 from sysdyn.cli.trade.pages import HEADS, cells, page, picture, verdict
 from sysdyn.cli.trade.reference import NoReference
 from sysdyn.cli.trade.search import tolerance
-from sysdyn.cli.trade.traded import Combination, Measured, RefusedCombination, Traded, meets
+from sysdyn.cli.trade.trade_results import Combination, Measured, RefusedCombination, Traded, meets
 from sysdyn.cli.trade.trading import trade
 from sysdyn.dsl import load
 from sysdyn.dsl.text.diagnostics import Report, SourceText

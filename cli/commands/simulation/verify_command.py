@@ -14,7 +14,7 @@ from sysdyn.cli.page.columns import align, fit_columns, refusals, terminal
 
 if TYPE_CHECKING:
     from sysdyn.cli.verify.agreement import Gap
-    from sysdyn.cli.verify.verified import Disagreement, RefusedFormulation, Verified, VerifiedRun
+    from sysdyn.cli.verify.verify_results import Disagreement, RefusedFormulation, Verified, VerifiedRun
 
 SPARE = ("constraints", "energy J", "estimate", "index")
 """Columns that a narrow terminal has no room for."""
@@ -38,7 +38,7 @@ def command(
     ledger of a run is off or the solver stops; what the scene expects is listed, and never decides.  Formulations run
     side by side where that pays, with equal results.
     """
-    from sysdyn.cli.run.request.asked import RunRequest
+    from sysdyn.cli.run.request.run_request import RunRequest
     from sysdyn.cli.run.request.sizes import sizes
     from sysdyn.cli.verify.verification import verify
 

@@ -20,9 +20,9 @@ from sysdyn.dsl.text.source import real
 
 if TYPE_CHECKING:
     from sysdyn.cli.golden.book import Accepted, GoldenScene
-    from sysdyn.cli.golden.checking import Case, Mutant
+    from sysdyn.cli.golden.golden_checks import Case, Mutant
     from sysdyn.cli.golden.recording import GoldenRecord
-    from sysdyn.cli.run.request.asked import RunRequest
+    from sysdyn.cli.run.request.run_request import RunRequest
 
 RTOL = 2e-4
 """At 1e-3 a change of 1 % in a parameter of middling influence goes unnoticed."""
@@ -82,7 +82,7 @@ def record(
     """
     from sysdyn.cli.golden.book import BOOK, Accepted, GoldenScene, read
     from sysdyn.cli.run.request import targets
-    from sysdyn.cli.run.request.asked import RunRequest
+    from sysdyn.cli.run.request.run_request import RunRequest
 
     request = RunRequest(**asked)
     if not (0.0 < rtol < 1.0 and 0.0 <= atol < math.inf):
@@ -175,7 +175,7 @@ def check(
 def _report(console: Console, cases: Sequence[Case], junit_file: str | None, html_file: str | None, pages: bool) -> int:
     """Show what the checks found, as text, JUnit and page; the exit code."""
     from sysdyn.cli.golden.changes import page
-    from sysdyn.cli.golden.checking import checkable
+    from sysdyn.cli.golden.golden_checks import checkable
     from sysdyn.cli.page.junit import junit
 
     wrong = sorted((c for c in cases if c.exit), key=lambda c: -c.ratio)

@@ -25,7 +25,7 @@ def command(console: Console, progress: str, output: str | None, **options: Any)
         raise UsageError(f"'{output}': a report is an .html")
     from sysdyn.cli.report.collect import collect
     from sysdyn.cli.report.page import page
-    from sysdyn.cli.run.request.asked import RunRequest, default_output
+    from sysdyn.cli.run.request.run_request import RunRequest, default_output
     from sysdyn.dsl.model import expression as ex
 
     request = RunRequest(**options)

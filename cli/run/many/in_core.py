@@ -14,7 +14,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 from sysdyn.cli.run.prepare import Prepared
-from sysdyn.cli.run.request.asked import RunRequest, options_of, stops
+from sysdyn.cli.run.request.run_request import RunRequest, options_of, stops
 from sysdyn.cli.run.request.targets import Target
 from sysdyn.cli.run.running import Ran
 from sysdyn.compiler.binding.binding import Binding

@@ -19,7 +19,7 @@ from sysdyn.dsl.text.diagnostics import Diagnostic, Place, Span
 from sysdyn.dsl.tree import syntax
 
 if TYPE_CHECKING:
-    from sysdyn.cli.run.request.asked import RunRequest
+    from sysdyn.cli.run.request.run_request import RunRequest
 
 INSTANTS = 2e7
 """Of a trace with a fixed interval: they are laid out before the run, about 50 bytes each."""

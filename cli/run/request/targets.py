@@ -18,7 +18,7 @@ from sysdyn.dsl.tree import syntax
 from sysdyn.values import dataclass
 
 if TYPE_CHECKING:
-    from sysdyn.cli.run.request.asked import RunRequest
+    from sysdyn.cli.run.request.run_request import RunRequest
 
 
 @dataclass(frozen=True, slots=True)

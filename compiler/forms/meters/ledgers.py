@@ -21,8 +21,8 @@ from sysdyn.compiler.forms.efforts import Effort
 from sysdyn.compiler.model.energies import EnergyModel, Row, UnknownFamily
 from sysdyn.compiler.model.terms import Nest, local_variables, summands
 from sysdyn.dsl.model.calculus import derivative
+from sysdyn.dsl.model.connected_components import Joined
 from sysdyn.dsl.model.expression import Node, add, const, is_const, scale, var, variables
-from sysdyn.dsl.model.joined import Joined
 from sysdyn.dsl.text.diagnostics import Place
 from sysdyn.values import dataclass
 

@@ -22,7 +22,7 @@ from sysdyn.compiler.network.primal.potentials import Potentials
 from sysdyn.compiler.network.primal.precedence import foremost
 from sysdyn.compiler.network.primal.reading import EliminationTable, IndexBox, Rewriter
 from sysdyn.compiler.network.primal.series import Series, series
-from sysdyn.compiler.network.primal.unspecified import guess_contents
+from sysdyn.compiler.network.primal.store_guesses import guess_contents
 from sysdyn.dsl.model.expression import Node, variables
 from sysdyn.dsl.model.network import Constraint, Coordinate, Dynamic, EnergyTerm, Expectation, Network, VirtualWork
 from sysdyn.dsl.model.rewriting import EXPRESSIONS, expressions

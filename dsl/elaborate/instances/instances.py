@@ -15,7 +15,7 @@ from sysdyn.dsl.elaborate.files import FileScope, library_components
 from sysdyn.dsl.elaborate.instances.head import Body, Interface
 from sysdyn.dsl.elaborate.instances.levels import choose_level, elsewhere
 from sysdyn.dsl.elaborate.instances.moulds import Moulds, charge
-from sysdyn.dsl.elaborate.instances.ports import PortRequest, Ports
+from sysdyn.dsl.elaborate.instances.port_binding import PortRequest, Ports
 from sysdyn.dsl.elaborate.instances.unit_variables import solve_units
 from sysdyn.dsl.elaborate.parts import flatten
 from sysdyn.dsl.elaborate.statements.declarations import DECLARED

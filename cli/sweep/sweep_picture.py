@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from sysdyn.cli.page.panels import COLOURS
 from sysdyn.cli.page.picture import drawing
-from sysdyn.cli.sweep.kept import Kept
+from sysdyn.cli.sweep.run_records import Kept
 from sysdyn.cli.sweep.sweeping import Swept
 
 MOST = 4

@@ -16,9 +16,9 @@ from typing import Any
 
 from sysdyn import __version__
 from sysdyn.cli.run.request import lock
-from sysdyn.cli.run.request.asked import RunRequest
+from sysdyn.cli.run.request.run_request import RunRequest
 from sysdyn.cli.run.request.targets import Target
-from sysdyn.cli.trade.traded import Combination, Measured, Runs, TradeReference
+from sysdyn.cli.trade.trade_results import Combination, Measured, Runs, TradeReference
 from sysdyn.compiler.program import cache
 from sysdyn.runtime.trace.trace import Trace
 

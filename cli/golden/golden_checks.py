@@ -17,7 +17,7 @@ from sysdyn.cli.failures import UsageError
 from sysdyn.cli.golden.book import GoldenScene
 from sysdyn.cli.golden.runs import GoldenRun, Stopped, between, run
 from sysdyn.cli.golden.structures import describe_change
-from sysdyn.cli.run.request.asked import RunRequest
+from sysdyn.cli.run.request.run_request import RunRequest
 from sysdyn.runtime.comparison.arrays import Arrays
 from sysdyn.runtime.comparison.curve import Floats
 from sysdyn.runtime.comparison.recorded import Recorded

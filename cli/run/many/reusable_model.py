@@ -21,14 +21,14 @@ from sysdyn.cli.failures import UsageError
 from sysdyn.cli.run.many.in_core import InCore
 from sysdyn.cli.run.prepare import Prepared
 from sysdyn.cli.run.request import targets
-from sysdyn.cli.run.request.asked import RunRequest, check_tolerances, options_of, parameters_of
+from sysdyn.cli.run.request.run_request import RunRequest, check_tolerances, options_of, parameters_of
 from sysdyn.cli.run.request.targets import Target
 from sysdyn.cli.run.running import Ran, integrate, ready
-from sysdyn.compiler.binding.again import Consequences, again
 from sysdyn.compiler.binding.binding import Binding
+from sysdyn.compiler.binding.rebinding import Consequences, again
 from sysdyn.dsl import load
 from sysdyn.dsl.model import expression as ex
-from sysdyn.dsl.rules.asked import TextConditions
+from sysdyn.dsl.rules.text_conditions import TextConditions
 from sysdyn.dsl.text.diagnostics import Diagnostic, ModelError, Report
 from sysdyn.runtime.many.asked import ROWS, NotApplicableError
 from sysdyn.runtime.model.description import Floats

@@ -7,7 +7,7 @@ import json
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from sysdyn.cli.analysis.linear import Linearisation
+from sysdyn.cli.analysis.linearisation import Linearisation
 from sysdyn.cli.console import finite
 
 if TYPE_CHECKING:

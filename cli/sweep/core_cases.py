@@ -8,8 +8,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 from sysdyn.cli.run.many.in_core import InCore
-from sysdyn.cli.run.many.loaded import Loaded
-from sysdyn.cli.sweep.kept import KeptRuns
+from sysdyn.cli.run.many.reusable_model import Loaded
+from sysdyn.cli.sweep.run_records import KeptRuns
 from sysdyn.dsl.model import expression as ex
 from sysdyn.dsl.text.diagnostics import ModelError, Report
 from sysdyn.runtime.accuracy.options import instants

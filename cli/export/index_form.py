@@ -5,10 +5,10 @@ from __future__ import annotations
 from collections.abc import Iterator
 from contextlib import contextmanager
 
-from sysdyn.cli.export.layout import Formed, choose
+from sysdyn.cli.export.tabulation import Formed, choose
 from sysdyn.cli.run.prepare import Prepared
 from sysdyn.cli.run.request import targets
-from sysdyn.cli.run.request.asked import RunRequest
+from sysdyn.cli.run.request.run_request import RunRequest
 from sysdyn.cli.run.start.flat_laws import impossible
 from sysdyn.cli.run.start.starting import start
 from sysdyn.dsl import load

@@ -15,7 +15,7 @@ from itertools import product
 
 import numpy as np
 from numpy.typing import NDArray
-from sysdyn.cli.analysis.asked import Found, contents, own_inputs
+from sysdyn.cli.analysis.operating_point import Found, contents, own_inputs
 from sysdyn.cli.failures import UsageError
 from sysdyn.cli.run.prepare import Prepared
 from sysdyn.cli.run.request.targets import Target

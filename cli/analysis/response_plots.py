@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 from sysdyn.cli.analysis.answers import Answer, Locus
-from sysdyn.cli.analysis.linear import Linearisation
+from sysdyn.cli.analysis.linearisation import Linearisation
 from sysdyn.cli.page.document import document, escape, table
 from sysdyn.cli.page.panels import COLOURS
 from sysdyn.cli.page.picture import drawing

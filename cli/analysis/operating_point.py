@@ -12,7 +12,7 @@ from sysdyn.cli.failures import UsageError
 from sysdyn.cli.run.events import plan
 from sysdyn.cli.run.prepare import Prepared, prepare
 from sysdyn.cli.run.request import targets
-from sysdyn.cli.run.request.asked import RunRequest, options_of, rest, stops, turning
+from sysdyn.cli.run.request.run_request import RunRequest, options_of, rest, stops, turning
 from sysdyn.cli.run.request.targets import Target
 from sysdyn.cli.run.start.flat_laws import impossible
 from sysdyn.cli.run.start.starting import Started, start
