@@ -62,6 +62,7 @@ def check_unused_components(document: ParsedFile) -> Iterator[tuple[str, Report]
 
 
 def _check_component(document: ParsedFile, component: syntax.ComponentDefinition) -> Report:
+    """The findings of a component under each of its levels, those within its own text alone."""
     report, source = Report(), document.file.source
     whole = [
         i

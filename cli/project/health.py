@@ -113,6 +113,7 @@ def _compiler() -> Iterator[HealthFinding]:
 
 
 def _cache() -> Iterator[HealthFinding]:
+    """Where compiled models are kept, how many and how large; a warning where it is not the folder asked for."""
     from sysdyn.compiler.program import cache
 
     folder, wanted = cache.folder(), cache.requested_folder()

@@ -111,13 +111,13 @@ def _nodes(root: Node) -> Nodes:
     return tuple(topological_unbound([root]))
 
 
-def again(binding: Binding, path: Consequences, overrides: Mapping[str, float]) -> Binding | None:
+def rebind(binding: Binding, path: Consequences, overrides: Mapping[str, float]) -> Binding | None:
     """The binding with these values, whose names are those that the way was made for."""
     with np.errstate(all="ignore"):
-        return _again(binding, path, overrides)
+        return _rebind(binding, path, overrides)
 
 
-def _again(binding: Binding, path: Consequences, overrides: Mapping[str, float]) -> Binding | None:
+def _rebind(binding: Binding, path: Consequences, overrides: Mapping[str, float]) -> Binding | None:
     """Bind anew by the formulas of `path` alone; None where a value is not finite or a decision of the first binding
     fails.
     """

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from sysdyn.cli.run.many.reusable_model import Loaded
 from sysdyn.cli.run.request.run_request import RunRequest
-from sysdyn.compiler.binding.rebinding import again
+from sysdyn.compiler.binding.rebinding import rebind
 from sysdyn.dsl.model import expression as ex
 
 MODELS = Path(__file__).parents[2] / "models"
@@ -31,7 +31,7 @@ def test_equals_a_binding_made_anew(name):
             if way is None:
                 continue
             ways += 1
-            one, other = again(binding, way, numbers), compiled.bind(numbers)
+            one, other = rebind(binding, way, numbers), compiled.bind(numbers)
         assert one is not None
         assert np.array_equal(one.p, other.p)
         assert one.values.keys() == other.values.keys()
@@ -52,4 +52,4 @@ def test_values_that_make_no_sense_are_left_to_the_binding():
     with ex.fresh(loaded.nodes):
         way = loaded.prepared.compiled.way(loaded.prepared.binding, frozenset(["l"]))
         assert way is not None
-        assert again(loaded.prepared.binding, way, {"l": float("nan")}) is None
+        assert rebind(loaded.prepared.binding, way, {"l": float("nan")}) is None

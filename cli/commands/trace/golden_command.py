@@ -268,7 +268,7 @@ def accept(
     goldens = book.find(Path(folder), names)
     renewed = [golden if rtol is None else replace(golden, rtol=rtol) for golden in goldens]
     # recorded anew, compared with what is kept
-    for golden, wanted, found in zip(goldens, renewed, _again(console, renewed, jobs), strict=True):
+    for golden, wanted, found in zip(goldens, renewed, _record_each(console, renewed, jobs), strict=True):
         if isinstance(found, int):
             code = worst((code, found))
             continue
@@ -291,7 +291,7 @@ def accept(
     return console.finish(code)
 
 
-def _again(console: Console, goldens: Sequence[GoldenScene], jobs: int | None) -> Iterator[GoldenRecord | int]:
+def _record_each(console: Console, goldens: Sequence[GoldenScene], jobs: int | None) -> Iterator[GoldenRecord | int]:
     """The record of each golden, made anew; the exit code after saying why there is none."""
     from sysdyn.cli.golden.jobs import record_again
     from sysdyn.cli.run.many.crew import Lost, each

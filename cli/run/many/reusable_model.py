@@ -25,7 +25,7 @@ from sysdyn.cli.run.request.run_request import RunRequest, check_tolerances, opt
 from sysdyn.cli.run.request.targets import Target
 from sysdyn.cli.run.running import Ran, integrate, ready
 from sysdyn.compiler.binding.binding import Binding
-from sysdyn.compiler.binding.rebinding import Consequences, again
+from sysdyn.compiler.binding.rebinding import Consequences, rebind
 from sysdyn.dsl import load
 from sysdyn.dsl.model import expression as ex
 from sysdyn.dsl.rules.text_conditions import TextConditions
@@ -110,7 +110,7 @@ class Compiled:
                     self.ways.clear()
                 self.ways[names] = compiled.way(binding, names)
             way = self.ways[names]
-            found = None if way is None else again(binding, way, {name: float(v) for name, v in numbers.items()})
+            found = None if way is None else rebind(binding, way, {name: float(v) for name, v in numbers.items()})
             if found is not None:
                 return found
         return compiled.bind(numbers)

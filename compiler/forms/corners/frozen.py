@@ -166,7 +166,8 @@ class _Freezer:
                 done[node] = self._frozen(node, held)
         return done[root]
 
-    def _again(self, branch: Node) -> Node:
+    def _rebuild_branch(self, branch: Node) -> Node:
+        """A branch of a frozen operation, rebuilt of frozen parts."""
         for node in topological([branch]):
             if node not in self.done:
                 self.done[node] = rebuild(node, tuple(self.done[a] for a in node.args))
@@ -193,8 +194,10 @@ class _Freezer:
             levels = (level, RESTS) if self.surfaces[k].jumps and node.data in (">=", "<=") else (level,)
             return either(as_said, *(compare("==", self.branch[k], const(b)) for b in levels))
         # abs, sign, max, ...: both branches, frozen in turn
-        above, below = (self._again(n) for n in ((found.above, found.below) if mine else (found.below, found.above)))
-        at_rest = const(0.0) if node.data == "sign" else self._again(found.above)
+        above, below = (
+            self._rebuild_branch(n) for n in ((found.above, found.below) if mine else (found.below, found.above))
+        )
+        at_rest = const(0.0) if node.data == "sign" else self._rebuild_branch(found.above)
         return self._branches(k, (above, at_rest, below), live, held)
 
     def _branches(self, k: int, sides: tuple[Node, Node, Node], live: Node, held: bool) -> Node:

@@ -316,6 +316,7 @@ class Instances(Ports):
         head: Interface,
         given: dict[str, Argument],
     ) -> None:
+        """Report parameters of a component that neither its text nor the instance gives a value (E406)."""
         for name, statement in head.parameters.items():
             if statement.value is None and name not in given:
                 unit = statement.unit.text if statement.unit else "..."
