@@ -161,7 +161,7 @@ def _build_network(
     # from here with the numbers of parameters: events of arrays one by one, sizes, the graph
     known = Values(elaborator.parts.parameters, reader.elements)
     if not report.failed and not _incomplete(report):
-        switches.expand_events(elaborator, known)
+        switches.expand_events(elaborator.context, known)
     bound_values.run(elaborator, known, report, reader.observations)
     if not report.failed and not _incomplete(report):
         graph_checks.run(elaborator, known, nodes_read(elaborator.parts), report)
@@ -184,7 +184,7 @@ def _elaborate(
     """The model with the levels and settings asked for: its names, elements and statements."""
     files = FileScope(document.file, report)
     elaborator = Elaborator(files, model, report)
-    elaborator.moved = frozenset(moved)
+    elaborator.inputs.moved = frozenset(moved)
     # names of the model first: scene and command line refer to them
     elaborator.names()
     reader = SceneReader(elaborator)
@@ -197,7 +197,7 @@ def _elaborate(
     # the command line wins over the scene
     for path, name in levels:
         text = SourceText("--level", f"{path}={name}")
-        elaborator.levels[path] = (name, text.place(0, len(text.text)))
+        elaborator.instances.levels[path] = (name, text.place(0, len(text.text)))
     # components, with their nodes and branches
     elaborator.elements()
     _unused_levels(elaborator, report)
@@ -264,7 +264,7 @@ def listing(
 
 def _unread(elaborator: Elaborator, scene: syntax.SceneDefinition | None) -> bool:
     """Whether a statement of the model, of a component in it, of the scene, or one that it needs could not be read."""
-    once = {id(body): body for _, body in elaborator.bodies}.values()
+    once = {id(body): body for _, body in elaborator.instances.bodies}.values()
     bodies = [statement for body in once for statement, _ in body]
     said = [*bodies, *(scene.body if scene else ())]
     within = (
@@ -275,8 +275,8 @@ def _unread(elaborator: Elaborator, scene: syntax.SceneDefinition | None) -> boo
 
 def _unused_levels(elaborator: Elaborator, report: Report) -> None:
     """A level for a path that is no component is a mistake, not a wish."""
-    known = {space.path for space, _ in elaborator.bodies} if elaborator.levels else set[str]()
-    for path, (name, place) in elaborator.levels.items():
+    known = {space.path for space, _ in elaborator.instances.bodies} if elaborator.instances.levels else set[str]()
+    for path, (name, place) in elaborator.instances.levels.items():
         unread = elaborator.space.scope.is_broken(re.split(r"[.[]", path)[0]) or elaborator.files.scope.missed
         if path not in known and not report.failed and not unread:
             near, whole = nearest(path, known), re.sub(r"\[[^]]*\]", "", path)
@@ -318,7 +318,7 @@ def _result(elaborator: Elaborator, reader: SceneReader, scene: Scene | None) ->
         discretes=frozenset(parts.discretes),
         events=tuple(parts.events),
         switches=tuple(parts.switches),
-        levels=tuple(elaborator.choices.values()),
+        levels=tuple(elaborator.instances.choices.values()),
         read=nodes_read(parts),
         literal=elaborator.resolver.sizes_read,
     )

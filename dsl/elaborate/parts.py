@@ -218,6 +218,10 @@ class ElaborationContext:
         """A span of the present text."""
         return Place(self.resolver.source, span)
 
+    def source_text(self, span: syntax.Span) -> str:
+        """The author's text of a span on one line."""
+        return " ".join(self.resolver.source.text[span.start : span.end].split())
+
     def add_statement(self, statement: EnergyTerm | VirtualWork | Constraint) -> None:
         """Takes in what the present model or instance says."""
         kinds: dict[type, list[Any]] = {EnergyTerm: self.parts.energies, VirtualWork: self.parts.works}

@@ -33,7 +33,7 @@ _Part = tuple[str, tuple[Loop, ...], Node]
 
 def run(model: Elaborator, known: Values, report: Report) -> None:
     """The rule for every component that claims it."""
-    for space, body in model.bodies:
+    for space, body in model.instances.bodies:
         claims = body.statements_of(syntax.LosslessStatement)
         if not claims:
             continue

@@ -72,7 +72,10 @@ class Read:
         (scene,) = load.document(source, Report()).scenes.values()
         self.context.report = report = Report()
         try:
-            with self.model.entering(self.model.space), self.context.entering_scope(self.model.space.scope, source):
+            with (
+                self.model.context.entering(self.model.space),
+                self.context.entering_scope(self.model.space.scope, source),
+            ):
                 value = self.context.resolve(scene.body[0].items[0].expr)
         except Failed:
             return next((d.code, d.message, d.help) for d in report)
@@ -245,7 +248,7 @@ def test_the_effort_of_a_constraint_along_a_displacement(read, residual, holonom
     """-(d residual/dq) multiplier, at x = 3, y = 7, multiplier 11."""
     source = SourceText("t.sd", f"scene s of m {{\n  trace {residual}, {target}\n}}\n")
     (scene,) = load.document(source, Report()).scenes.values()
-    with read.model.entering(read.model.space), read.context.entering_scope(read.model.space.scope, source):
+    with read.model.context.entering(read.model.space), read.context.entering_scope(read.model.space.scope, source):
         row, along = (read.context.resolve(item.expr).node for item in scene.body[0].items)
     found = reaction(row, holonomic, along, ex.param("multiplier"))
     at = {"x": 3.0, "y": 7.0}

@@ -61,7 +61,10 @@ class Read:
         expression, source = self.parsed(text)
         self.context.report = report = Report()
         try:
-            with self.model.entering(self.model.space), self.context.entering_scope(self.model.space.scope, source):
+            with (
+                self.model.context.entering(self.model.space),
+                self.context.entering_scope(self.model.space.scope, source),
+            ):
                 return do(expression)
         except Failed:
             (d,) = report

@@ -26,7 +26,7 @@ def choose_level(
     chosen, place = frame.levels.get(path, (None, None))
     # by the instance: `M: motor.thermal(...)`
     if chosen is None and len(s.component.names) > 1:
-        chosen, place = s.component.names[1], frame.place(s.component.span)
+        chosen, place = s.component.names[1], frame.context.place(s.component.span)
     free = chosen is None
     # by the component: `level simple default { ... }`
     if chosen is None:
@@ -43,13 +43,13 @@ def choose_level(
         message = f"no level '{chosen}'; '{component.name}' has {', '.join(levels) or 'none'}"
         near = nearest(chosen, levels)
         remedy = f"nearest: '{near}'" if near else None if levels else "leave the level out"
-        frame.report.error("E802", message, place or frame.place(s.component.span), help=remedy)
+        frame.context.report.error("E802", message, place or frame.context.place(s.component.span), help=remedy)
         raise Failed
     if len(levels) > 1:
         frame.choices[path] = LevelChoice(path, chosen, tuple(levels), free)
     bodies = {name: _inherit_statements(frame, component, levels, level, ()) for name, level in levels.items()}
     described = {name: (level, bodies[name]) for name, level in levels.items()}
-    level_ports(component.name, described, component.source, frame.report)
+    level_ports(component.name, described, component.source, frame.context.report)
     return chosen, (*base, *bodies[chosen])
 
 
@@ -80,7 +80,7 @@ def _inherit_statements(
     # `level a extends b`, where b is missing, is a itself, or extends a
     if parent is None or name in chain or name == level.name.name:
         message = f"level '{level.name.name}' extends '{name}', which is no other level of '{component.name}'"
-        frame.report.error("E802", message, Place(component.source, level.extends.span))
+        frame.context.report.error("E802", message, Place(component.source, level.extends.span))
         raise Failed
     inherited = _inherit_statements(frame, component, levels, parent, (*chain, level.name.name))
     own = {key: b for b in level.body if (key := _label(b)) is not None}
@@ -95,7 +95,7 @@ def _inherit_statements(
             ports = isinstance(own[key], syntax.InstanceStatement) and isinstance(statement, syntax.InstanceStatement)
             what = "an element of other ports" if ports else "a statement of another kind"
             message = f"'{key}' of level '{level.name.name}' replaces {what}"
-            frame.report.error("E808", message, Place(component.source, own[key].span), help="a new label")
+            frame.context.report.error("E808", message, Place(component.source, own[key].span), help="a new label")
             raise Failed
     return (*kept, *level.body)
 

@@ -175,10 +175,10 @@ class Moulds:
         self, it: Instances, symbol: InstanceSymbol, s: syntax.InstanceStatement, component: ComponentSymbol, body: Body
     ) -> bool:
         """Cast an instance where it stands, if there is a mould and nothing can be wrong with it."""
-        here, given = it.current, {a.name or "": a.value for a in s.args or ()}
+        here, given = it.context.current, {a.name or "": a.value for a in s.args or ()}
         mould = self._moulds.get(self._key(s, body, here.scope))
         # no mould of this shape; an array; loops around; coordinates, which a cast cannot read
-        if mould is None or symbol.spaces or here.prefix or not it.resolver.free or it.parts.coordinates:
+        if mould is None or symbol.spaces or here.prefix or not it.resolver.free or it.context.parts.coordinates:
             return False
         # casts have one branch, and none contains itself
         if len(s.connections) != 1 or component.name in (*here.chain, here.component):
@@ -187,18 +187,18 @@ class Moulds:
         for name, value in given.items():
             if not isinstance(value, syntax.QuantityLiteral) or (name, value.unit.text) not in mould.fitting:
                 return False
-        ends = _between(it.scope, s.connections[0], mould.domain)
+        ends = _between(it.context.scope, s.connections[0], mould.domain)
         if ends is None or len(given) != len(s.args or ()):
             return False
         charge(it, s, component)
         values = {name: it.resolver.scalar(value).node for name, value in given.items()}
         path = f"{here.path}.{s.decl.name}" if here.path else s.decl.name
-        space = Likeness(here, component, path, it.place(s.decl.span), mould, ends)
+        space = Likeness(here, component, path, it.context.place(s.decl.span), mould, ends)
         # the value that the instance gives, or the formula of the component in its names
         for held in mould.parameters:
             name = f"{path}.{held.name}"
             node = values[held.name] if held.value is None else held.value.under(path)
-            it.parts.parameters[name] = Parameter(name, (), held.unit, (node,), (), held.place)
+            it.context.parts.parameters[name] = Parameter(name, (), held.unit, (node,), (), held.place)
         symbol.spaces.append(space)
         it.bodies.append((space, body))
         return True
@@ -207,16 +207,16 @@ class Moulds:
 def charge(it: Instances, s: syntax.InstanceStatement, component: ComponentSymbol) -> None:
     """An instance counts, whichever way it takes."""
     try:
-        budget.check_depth(len(it.current.chain), "components are")
+        budget.check_depth(len(it.context.current.chain), "components are")
         budget.unfold(budget.INSTANCE, f"instances of component '{component.name}'")
     except budget.SpentError as spent:
-        spent.place = spent.place or it.place(s.span)
+        spent.place = spent.place or it.context.place(s.span)
         raise
 
 
 def _cast_parameter(it: Instances, space: Space, name: str, *, given: bool) -> MouldParameter | None:
     """A parameter as an instance has it; None where another may have it otherwise."""
-    parameter, symbol = it.parts.parameters.get(f"{space.path}.{name}"), space.scope.symbols.get(name)
+    parameter, symbol = it.context.parts.parameters.get(f"{space.path}.{name}"), space.scope.symbols.get(name)
     if parameter is None or not isinstance(symbol, ParameterSymbol) or symbol.truth:
         return None
     value = None if given else cast_of(parameter.values[0], space.path)
@@ -232,13 +232,13 @@ def law_of_cast(it: Elaborator, space: Likeness) -> None:
         kind, side, law, place = mould.branch
         node, ends = law.under(path), space.ends[""]
         space.laws[""], it.resolver.laws[path] = place, LawOf(kind, side, node)
-        it.parts.branches.append(it.branch(path, mould.domain, (), (), (kind, side, node), ends, place))
+        it.parts.branches.append(it.element_builder.branch(path, mould.domain, (), (), (kind, side, node), ends, place))
         return
-    before, waiting = _learnt(it), len(it.pending)
-    with it.entering(space):
-        it.each([(mould.law, ())], it.law)
-        if len(it.pending) > waiting:
-            it.settle_law(it.pending.pop())
+    before, waiting = _learnt(it), len(it.element_builder.pending)
+    with it.context.entering(space):
+        it.context.each([(mould.law, ())], it.element_builder.law)
+        if len(it.element_builder.pending) > waiting:
+            it.settle_law(it.element_builder.pending.pop())
     branch = it.parts.branches[-1] if it.parts.branches else None
     if before == _learnt(it) and branch is not None and branch.name == path and branch.law is not None:
         found = cast_of(branch.law, path)
@@ -254,8 +254,8 @@ def required_of(it: Elaborator, space: Likeness, body: Body) -> None:
             it.parts.requirements.append(CastRequirement(node, space.path, place, written))
         return
     before, first, said = _learnt(it), len(it.parts.requirements), body.statements_of(syntax.RequireStatement)
-    with it.entering(space):
-        it.each(said, it.require)
+    with it.context.entering(space):
+        it.context.each(said, it.equations.require)
     own = it.parts.requirements[first:]
     casts = [(cast_of(r.condition, space.path), r.place, r.written) for r in own]
     sound = tuple((node, place, written) for node, place, written in casts if node is not None)
@@ -266,7 +266,7 @@ def required_of(it: Elaborator, space: Likeness, body: Body) -> None:
 def _learnt(it: Elaborator) -> tuple[int, ...]:
     """How much has been found beside what a statement becomes."""
     beside = it.resolver.uses, it.resolver.whole, it.resolver.quadratures, it.parts.drafts, it.parts.watched
-    return len(it.report), it.waiting, len(it.resolver.derived), *map(len, beside)
+    return len(it.context.report), it.context.waiting, len(it.resolver.derived), *map(len, beside)
 
 
 def _plain(body: Body) -> bool:

@@ -5,8 +5,9 @@ from __future__ import annotations
 from dataclasses import field
 
 from sysdyn.dsl.elaborate.instances import bundles
+from sysdyn.dsl.elaborate.instances.connections import Connections
 from sysdyn.dsl.elaborate.instances.head import Interface
-from sysdyn.dsl.elaborate.statements.inputs import Inputs
+from sysdyn.dsl.elaborate.parts import ElaborationContext
 from sysdyn.dsl.model import expression as ex
 from sysdyn.dsl.model.expression_text import to_text
 from sysdyn.dsl.names.failures import Failed
@@ -50,8 +51,11 @@ def port_declaration(statement: syntax.PortStatement, name: str) -> syntax.Decl:
     return next(d for d in statement.decls if d.name == name)
 
 
-class Ports(Inputs):
+class Ports:
     """Connects instances."""
+
+    def __init__(self, context: ElaborationContext, connections: Connections) -> None:
+        self.context, self.resolver, self.connections = context, context.resolver, connections
 
     def connect(self, asked: PortRequest) -> None:
         """Binds all ports, branches and inputs."""
@@ -95,11 +99,13 @@ class Ports(Inputs):
             nodes += [c.node] if isinstance(c, syntax.Single) else []
         bound = {c.name.name for c in s.connections if isinstance(c, (syntax.Bind, syntax.BindAcross))}
         across = [c for c in s.connections if isinstance(c, syntax.Across)]
-        if len(across) > 1 and all(self.source_text(c.plus.span) in ports for c in across):  # `p -> a` for `p = a`
+        if len(across) > 1 and all(
+            self.context.source_text(c.plus.span) in ports for c in across
+        ):  # `p -> a` for `p = a`
             nodes = [c.minus for c in across]
-            bound |= set(ports) - {self.source_text(c.plus.span) for c in across}
+            bound |= set(ports) - {self.context.source_text(c.plus.span) for c in across}
         left = [name for name in (*ports, *head.inputs) if name not in bound]
-        texts = iter([self.source_text(node.span) for node in nodes])
+        texts = iter([self.context.source_text(node.span) for node in nodes])
         pairs = []
         for name, text in zip(left, texts, strict=False):
             pairs.append(f"{name} = {text}" + (f" -> {next(texts, 'ground')}" if name in head.branches else ""))
@@ -138,7 +144,7 @@ class Ports(Inputs):
         if inner is not None:
             help_ = f"port {name}: {inner} in component '{component.name}': a node is of its inside alone"
         if list(head.branches) == [""] and not head.ports and not head.inputs:  # its two ends have no names
-            ends = [self._text(c.value) for c in s.connections if isinstance(c, syntax.Bind)]
+            ends = [self.connections.end_text(c.value) for c in s.connections if isinstance(c, syntax.Bind)]
             help_ = " -> ".join((*ends[:2], "ground")[:2])
         return self.resolver.fail(
             "E407", f"'{component.name}' has no port or input '{name}'", connection.span, help=help_
@@ -150,18 +156,18 @@ class Ports(Inputs):
         asked.bound.add(name)
         word = statement.domain
         wanted = space.scope.find(word.name)
-        place = self.place(value.span)
+        place = self.context.place(value.span)
         if isinstance(wanted, BundleSymbol):
             space.scope.symbols[name] = self._bundle_bound(s, name, wanted, value)
             return
         if not isinstance(wanted, DomainSymbol):
             message = f"'{word.name}' is not a domain"
-            self.report.error("E202", message, Place(space.source, word.span))
+            self.context.report.error("E202", message, Place(space.source, word.span))
             raise Failed
         if port_declaration(statement, name).indices:
             space.scope.symbols[name] = self._array_bound(s, name, wanted, value)
             return
-        bound_to = self.end(value, wanted)
+        bound_to = self.connections.end(value, wanted)
         assert bound_to is not None
         self._same_domain(s, f"port '{name}'", wanted, bound_to, value)
         space.scope.symbols[name] = PortSymbol(name, bound_to, place)
@@ -176,9 +182,10 @@ class Ports(Inputs):
         if coordinate is not None:
             symbol = coordinate_node(coordinate)
         if found is None or not isinstance(symbol, NodeSymbol) or found.indices or not symbol.family.shape:
-            message = f"port '{name}' of '{s.decl.name}' is an array, '{self._text(value)}' is no array of nodes"
+            text = self.connections.end_text(value)
+            message = f"port '{name}' of '{s.decl.name}' is an array, '{text}' is no array of nodes"
             raise self.resolver.fail("E805", message, value.span, help=f"node a[1..3]: {wanted.name}, and {name} = a")
-        own, place = symbol.family, self.place(value.span)
+        own, place = symbol.family, self.context.place(value.span)
         prefix = tuple(ex.substitute(a, found.change) for a in own.prefix)
         node = NodeSymbol(name, NameFamily(own.name, prefix, own.around, own.shape), symbol.domain, place, coordinate)
         self._same_domain(s, f"port '{name}'", wanted, End(node, (), symbol.domain), value)
@@ -187,41 +194,43 @@ class Ports(Inputs):
     def port_shapes(self, s: syntax.InstanceStatement, head: Interface) -> None:
         """E805: ports that are arrays have the bounds of the nodes that they are bound to."""
         for name, statement in head.ports.items():
-            decl, symbol = port_declaration(statement, name), self.scope.symbols.get(name)
+            decl, symbol = port_declaration(statement, name), self.context.scope.symbols.get(name)
             if not decl.indices or not isinstance(symbol, NodeSymbol):
                 continue
-            bounds = [tuple(map(self.with_instance_parameters, b)) for b in self.shape(decl)]
-            others = [tuple(map(self.with_instance_parameters, b)) for b in symbol.family.shape]
+            bounds = [tuple(map(self.context.with_instance_parameters, b)) for b in self.context.shape(decl)]
+            others = [tuple(map(self.context.with_instance_parameters, b)) for b in symbol.family.shape]
             if bounds != others:
                 shown = [", ".join(f"{to_text(a)}..{to_text(b)}" for a, b in pairs) for pairs in (bounds, others)]
                 message = f"port '{name}' of '{s.decl.name}' runs over {shown[0]}, its nodes over {shown[1]}"
                 where = symbol.place
-                self.report.error("E805", message, where, help=f"nodes over {shown[0]}")
+                self.context.report.error("E805", message, where, help=f"nodes over {shown[0]}")
 
     def _bundle_bound(
         self, s: syntax.InstanceStatement, name: str, wanted: BundleSymbol, value: syntax.Expr
     ) -> BundleNode:
         """A port of several nodes, bound to a bundle of the same members or to ground."""
-        place = self.place(value.span)
+        place = self.context.place(value.span)
         if isinstance(value, syntax.Name) and value.name == "ground":
             return bundles.ground_bundle(name, wanted, place)
         found = self.resolver.locate(value)
         if found is None or not isinstance(found.symbol, BundleNode) or not bundles.fits(wanted, found.symbol):
-            message = f"port '{name}' of '{s.decl.name}' is a bundle {wanted.name}, '{self._text(value)}' is none"
+            text = self.connections.end_text(value)
+            message = f"port '{name}' of '{s.decl.name}' is a bundle {wanted.name}, '{text}' is none"
             members = ", ".join(f"{m}: {kind.name}" for m, kind in wanted.members)
             help_ = f"a node of {wanted.name} ({members}), or ground"
             raise self.resolver.fail("E401", message, value.span, help=help_)
         indices, change = found.indices, found.change
         return bundles.bound(
-            name, found.symbol, change, lambda node: self._node_end(node, indices, change, value), place
+            name, found.symbol, change, lambda node: self.connections.node_end(node, indices, change, value), place
         )
 
     def _same_domain(
         self, s: syntax.InstanceStatement, what: str, wanted: DomainSymbol, end: End, value: syntax.Expr
     ) -> None:
         if end.domain.name != wanted.name:
-            message = f"{what} of '{s.decl.name}' is {wanted.name}, node '{self._text(value)}' is {end.domain.name}"
-            raise self.other_domain(message, wanted, end, value.span)
+            text = self.connections.end_text(value)
+            message = f"{what} of '{s.decl.name}' is {wanted.name}, node '{text}' is {end.domain.name}"
+            raise self.connections.other_domain(message, wanted, end, value.span)
 
     def _bind_branch(self, asked: PortRequest, name: str, connection: syntax.Connection) -> None:
         """A branch between two ends, or along an expression."""
@@ -232,30 +241,30 @@ class Ports(Inputs):
             near = nearest(name, others)
             said = f"nearest: '{near}'" if near else f"it has {', '.join(others) or 'none'}"
             if name in head.ports and isinstance(connection, syntax.BindAcross):
-                said = f"{name} = {self._text(connection.plus)}: a port is one node"
+                said = f"{name} = {self.connections.end_text(connection.plus)}: a port is one node"
             raise self.resolver.fail(
                 "E407", f"'{asked.component.name}' has no branch '{name}'", connection.span, help=said
             )
         # two connections for one branch, as `R: resistor(...) a b` in place of `a -> b`
         if name in asked.bound:
             message = f"'{s.decl.name}: {asked.component.name}' needs 1 connection, has {len(s.connections)}"
-            nodes = [self._text(c.node) for c in s.connections if isinstance(c, syntax.Single)]
+            nodes = [self.connections.end_text(c.node) for c in s.connections if isinstance(c, syntax.Single)]
             help_ = " -> ".join(nodes) if len(s.connections) == len(nodes) == 2 else None
             raise self.resolver.fail("E402", message, connection.span, help=help_)
         word = head.branches[name].domain
         wanted = space.scope.find(word.name)
         if not isinstance(wanted, DomainSymbol):
-            self.report.error("E202", f"'{word.name}' is not a domain", Place(space.source, word.span))
+            self.context.report.error("E202", f"'{word.name}' is not a domain", Place(space.source, word.span))
             raise Failed
         # the ends, which have to be of the branch's domain
-        ends = self._ends(s, connection, wanted)
+        ends = self.connections.ends_of(s, connection, wanted)
         if ends.domain is not None and ends.on is None and ends.domain.name != wanted.name:
             end = next(e for e in (ends.plus, ends.minus) if e is not None and e.node is not None)
             assert end.node is not None
             message = f"'{s.decl.name}' is {wanted.name}, its node '{end.node.name}' is {ends.domain.name}"
-            raise self.other_domain(message, wanted, end, connection.span)
+            raise self.connections.other_domain(message, wanted, end, connection.span)
         family = NameFamily(f"{space.path}.{name}" if name else space.path, space.prefix, space.around, ())
-        symbol = BranchSymbol(name or s.decl.name, family, wanted, self.place(s.decl.span))
+        symbol = BranchSymbol(name or s.decl.name, family, wanted, self.context.place(s.decl.span))
         space.scope.symbols[name] = symbol
         space.ends[name] = ends
         # the component's own branch: its laws may read e, f, q, p without a name

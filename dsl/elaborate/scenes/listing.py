@@ -83,7 +83,7 @@ def readable(elaborator: Elaborator, known: Values) -> tuple[Readable, ...]:
     found += [_Candidate(f"audit.{m}", f"audit.{m}", "audit", "audit") for m in (*AUDIT, *sorted(pseudo))]
     expressions = _expressions([c.read for c in found])
     listed = []
-    with elaborator.entering(elaborator.space), elaborator.resolver.leniently():
+    with elaborator.context.entering(elaborator.space), elaborator.resolver.leniently():
         for candidate, (source, expression) in zip(found, expressions, strict=True):
             unit = _unit(elaborator, source, expression)
             if unit is not None:
@@ -94,7 +94,7 @@ def readable(elaborator: Elaborator, known: Values) -> tuple[Readable, ...]:
 def instances(elaborator: Elaborator) -> tuple[ListedInstance, ...]:
     """The components in the model, those inside others too; an array is one entry."""
     found: dict[str, ListedInstance] = {}
-    for space, _ in elaborator.bodies:
+    for space, _ in elaborator.instances.bodies:
         if space.path:
             component = space.file_scope.find(space.component)
             body = getattr(component, "body", ())
@@ -139,7 +139,7 @@ class _Walk:
         self.known = known
         self.loops: dict[int, tuple[syntax.ForStatement, ...]] = {}
         """The loops around the declaration of a let or an output, by its symbol's identity."""
-        for space, body in elaborator.bodies:
+        for space, body in elaborator.instances.bodies:
             for statement, loops in body:
                 if isinstance(statement, (syntax.LetStatement, syntax.OutputStatement)) and loops:
                     symbol = space.scope.symbols.get(statement.decl.name)

@@ -43,7 +43,7 @@ class SceneReader:
     def __init__(self, elaborator: Elaborator) -> None:
         self.model = elaborator
         self.resolver = elaborator.resolver
-        self.report = elaborator.report
+        self.report = elaborator.context.report
         self.observations: list[Observation] = []
         self.given = Settings(elaborator)
         self._raw: dict[Node, str] = {}  # traced expression before its unit -> name
@@ -86,7 +86,7 @@ class SceneReader:
         return Scene(scene.name.name, place, **self._found)  # type: ignore[arg-type]
 
     def _each(self, scene: syntax.SceneDefinition, table: dict[type, Callable[..., None]]) -> None:
-        with self.model.entering(self.model.space):
+        with self.model.context.entering(self.model.space):
             for statement in scene.body:
                 if isinstance(statement, syntax.BrokenStatement):
                     self.model.space.scope.broken |= statement.names
@@ -96,7 +96,10 @@ class SceneReader:
 
     def command(self, source: SourceText, s: _Said, do: Callable[[SceneReader, _Said], None]) -> None:
         """A `--set` or `--outputs` of the command line."""
-        with self.model.entering(self.model.space), self.resolver.entering_scope(self.model.space.scope, source):
+        with (
+            self.model.context.entering(self.model.space),
+            self.resolver.entering_scope(self.model.space.scope, source),
+        ):
             self.carry_out(lambda statement: do(self, statement), s)
 
     def carry_out(self, do: Callable[..., None], statement: syntax.SceneStatement | syntax.TraceItem) -> None:
@@ -357,22 +360,22 @@ class SceneReader:
     # -- the rest ------------------------------------------------------------------------------------------
 
     def _init(self, s: syntax.InitStatement) -> None:
-        self.model.initial(s, override=True)
+        self.model.equations.initial(s, override=True)
 
     def _expect(self, s: syntax.ExpectStatement) -> None:
-        self.model.expect(s)
+        self.model.equations.expect(s)
 
     def _golden(self, s: syntax.GoldenStatement) -> None:
-        self.model.golden(s)
+        self.model.equations.golden(s)
 
     def level(self, s: syntax.SceneLevelStatement) -> None:
         """`level ref = name`: before the model's instances are elaborated."""
         self._one("level", s.target)
         text = " ".join(self.resolver.source.text[s.target.span.start : s.target.span.end].split())
-        self.model.levels[text.replace(" ", "")] = (s.level.name, self.resolver.place(s.span))
+        self.model.instances.levels[text.replace(" ", "")] = (s.level.name, self.resolver.place(s.span))
 
     def _when(self, s: syntax.WhenStatement) -> None:
-        events.when(self.model, s)
+        events.when(self.model.context, s)
 
 
 _STATEMENTS: dict[type, Callable[..., None]] = {

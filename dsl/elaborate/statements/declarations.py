@@ -7,6 +7,7 @@ from contextlib import ExitStack
 from dataclasses import replace
 
 from sysdyn.dsl.elaborate.instances.head import Body
+from sysdyn.dsl.elaborate.parts import ElaborationContext
 from sysdyn.dsl.elaborate.statements import events
 from sysdyn.dsl.elaborate.statements.parameters import ParameterDeclarations
 from sysdyn.dsl.model import dimensions as dim
@@ -30,7 +31,7 @@ from sysdyn.dsl.names.symbols import (
     Vector,
     nearest,
 )
-from sysdyn.dsl.text.diagnostics import Related, Report
+from sysdyn.dsl.text.diagnostics import Related
 from sysdyn.dsl.tree import syntax
 
 DECLARED = (
@@ -49,11 +50,12 @@ BEGINNING = (syntax.CoordStatement, syntax.ImplicitStatement, syntax.StateStatem
 """Those that may say a value to begin with, which is read by `begin` once all names stand."""
 
 
-class Declarations(ParameterDeclarations):
+class Declarations:
     """Brings the names of a space into scope."""
 
-    def __init__(self, report: Report) -> None:
-        super().__init__(report)
+    def __init__(self, context: ElaborationContext, parameters: ParameterDeclarations) -> None:
+        self.context, self.resolver, self.parts = context, context.resolver, context.parts
+        self.parameters = parameters
         self._begun: dict[tuple[Node, tuple[Loop, ...], int], InitialCondition] = {}  # by target, loops, depth
 
     def declare_all(self, body: Body, do: Callable[[syntax.Statement], None], more: tuple[type, ...] = ()) -> None:
@@ -61,15 +63,15 @@ class Declarations(ParameterDeclarations):
         values to begin with behind all names.  more: kinds of statements that `do` reads besides.
         """
         statements = body.with_loops((*DECLARED, *more))
-        self.each([s for s in statements if not _takes_its_unit(s[0])], do)
+        self.context.each([s for s in statements if not _takes_its_unit(s[0])], do)
         if late := [s for s in statements if _takes_its_unit(s[0])]:
             named = {
                 s.decl.name: (s, at)
                 for s, at in late
                 if isinstance(s, syntax.StateStatement | syntax.DiscreteStatement)
             }
-            self.each(late if len(named) < len(late) else self.by_dependence(named), do)
-        self.each(body.statements_of(BEGINNING), self.begin)
+            self.context.each(late if len(named) < len(late) else self.parameters.by_dependence(named), do)
+        self.context.each(body.statements_of(BEGINNING), self.begin)
 
     def declare(self, statement: syntax.Statement) -> None:
         """One declaration; statements of other kinds are passed over."""
@@ -79,11 +81,11 @@ class Declarations(ParameterDeclarations):
                 self._coordinates(statement)
             # `implicit F: N`: an unknown that gammas determine
             case syntax.ImplicitStatement():
-                unit = self.unit(statement.unit)
+                unit = self.context.unit(statement.unit)
                 for decl in statement.decls:
-                    family = self.current.family(decl.name, self.shape(decl))
+                    family = self.context.current.family(decl.name, self.context.shape(decl))
                     self._enter_unknown(decl, "e", family, unit.dimension, None, False)
-                    self.parts.unknowns.append(Unknown(family.name, family.whole, unit, self.place(decl.span)))
+                    self.parts.unknowns.append(Unknown(family.name, family.whole, unit, self.context.place(decl.span)))
             case syntax.StateStatement():
                 self._state(statement)
             case syntax.NodeStatement():
@@ -94,10 +96,10 @@ class Declarations(ParameterDeclarations):
             # a label: its multiplier and residual can be read
             case syntax.ConstraintStatement():
                 decl = statement.decl
-                family = self.current.family(decl.name)
-                self.enter(ConstraintSymbol(decl.name, statement.kind, family, self.place(decl.span)))
+                family = self.context.current.family(decl.name)
+                self.context.enter(ConstraintSymbol(decl.name, statement.kind, family, self.context.place(decl.span)))
             case syntax.DiscreteStatement():
-                events.discrete(self, statement)
+                events.discrete(self.context, statement)
 
     def _enter_unknown(
         self,
@@ -108,21 +110,21 @@ class Declarations(ParameterDeclarations):
         domain: DomainSymbol | None,
         co: bool,
     ) -> None:
-        self.enter(UnknownSymbol(decl.name, kind, family, dimension, domain, co, self.place(decl.span)))
+        self.context.enter(UnknownSymbol(decl.name, kind, family, dimension, domain, co, self.context.place(decl.span)))
 
     def _nodes(self, statement: syntax.NodeStatement) -> None:
         """Nodes, and the members of a bundle of them."""
-        bundle = self.scope.find(statement.domain.name)
+        bundle = self.context.scope.find(statement.domain.name)
         if isinstance(bundle, BundleSymbol):
             if statement.init is not None:
                 message = "a bundle has no single initial value"
                 raise self.resolver.fail("E207", message, statement.init.span, help="init name.member.q = ...")
             for decl in statement.decls:
-                self.enter(self._bundle(decl, decl.name, bundle))
+                self.context.enter(self._bundle(decl, decl.name, bundle))
             return
         domain = self.domain(statement.domain)
         for decl in statement.decls:
-            self.enter(self._node(decl, decl.name, domain))
+            self.context.enter(self._node(decl, decl.name, domain))
 
     def _bundle(self, decl: syntax.Decl, name: str, bundle: BundleSymbol) -> BundleNode:
         """The nodes of a bundle, of those within it too; name: the path to it."""
@@ -133,11 +135,11 @@ class Declarations(ParameterDeclarations):
                 members[member] = self._bundle(decl, inner, kind)
             else:
                 members[member] = self._node(decl, inner, kind)
-        return BundleNode(name, members, self.place(decl.span))
+        return BundleNode(name, members, self.context.place(decl.span))
 
     def _node(self, decl: syntax.Decl, name: str, domain: DomainSymbol) -> NodeSymbol:
-        family = self.current.family(name, self.shape(decl))
-        place = self.place(decl.span)
+        family = self.context.current.family(name, self.context.shape(decl))
+        place = self.context.place(decl.span)
         self.parts.nodes.append(NodeFamily(family.name, family.whole, domain, place))
         return NodeSymbol(name, family, domain, place)
 
@@ -148,9 +150,9 @@ class Declarations(ParameterDeclarations):
         own, rate = (domain.momentum, domain.effort) if co else (domain.displacement, domain.flow)
         conjugate, effort = (domain.displacement, domain.flow) if co else (domain.momentum, domain.effort)
         for decl in statement.decls:
-            family = self.current.family(decl.name, self.shape(decl))
+            family = self.context.current.family(decl.name, self.context.shape(decl))
             self._enter_unknown(decl, "q", family, own.dimension, domain, co)
-            place = self.place(decl.span)
+            place = self.context.place(decl.span)
             self.parts.coordinates.append(
                 Coordinate(
                     family.name, family.whole, co, own, rate, conjugate, effort, statement.tangible, place, domain
@@ -172,8 +174,8 @@ class Declarations(ParameterDeclarations):
         if init is None:
             return
         for decl in decls:
-            symbol = self.scope.symbols.get(decl.name)
-            if not isinstance(symbol, UnknownSymbol | NodeSymbol) or symbol.place != self.place(decl.span):
+            symbol = self.context.scope.symbols.get(decl.name)
+            if not isinstance(symbol, UnknownSymbol | NodeSymbol) or symbol.place != self.context.place(decl.span):
                 raise Failed
             # the kind of unknown whose value is given
             if isinstance(symbol, UnknownSymbol):
@@ -194,13 +196,14 @@ class Declarations(ParameterDeclarations):
         outer = len(self.resolver.loops)
         with ExitStack() as stack:
             at = tuple(
-                self.loop_index(index) or ex.index(stack.enter_context(self.resolver.loop(f"i{k + 1}", *bounds)).index)
+                self.context.loop_index(index)
+                or ex.index(stack.enter_context(self.resolver.loop(f"i{k + 1}", *bounds)).index)
                 for k, (index, bounds) in enumerate(zip(decl.indices, family.shape, strict=True))
             )
             target = ex.var(family.name, kind, *family.prefix, *at)
             for one, value, loops in self.values_at_start(target, init.value, dimension, message, outer):
                 fixed, unit = init.kind == "fixed", si(dimension).text
-                self.add_initial(InitialCondition(one, value, fixed, loops, self.place(init.span), unit=unit))
+                self.add_initial(InitialCondition(one, value, fixed, loops, self.context.place(init.span), unit=unit))
 
     def values_at_start(
         self, target: Node, written: syntax.Expr, dimension: Dimension, message: str, outer: int
@@ -216,7 +219,7 @@ class Declarations(ParameterDeclarations):
         own, items = loops[-1], found.items
         name = str(target).partition("[")[0]
         self.resolver.uses.append(
-            Use((own.first, own.last), own.last, loops[:outer], name, self.place(written.span), len(items))
+            Use((own.first, own.last), own.last, loops[:outer], name, self.context.place(written.span), len(items))
         )
         for k, item in enumerate(items):
             at = {ex.index(own.index): ex.add(own.first, ex.const(k))}
@@ -225,27 +228,27 @@ class Declarations(ParameterDeclarations):
 
     def add_initial(self, initial: InitialCondition, override: bool = False) -> None:
         """Enter an initial value; override: of a scene.  What stands further outside goes before (language, 34)."""
-        path = self.current.path
+        path = self.context.current.path
         initial = replace(initial, depth=0 if override else 2 + path.count(".") if path else 1)
         before = self._begun.setdefault((initial.target, initial.loops, initial.depth), initial)
         if before is not initial:
             related = (Related("first here", before.place),)
             message = f"'{initial.target}' gets its initial value twice"
-            self.report.error("E106", message, initial.place, help="one of the two", related=related)
+            self.context.report.error("E106", message, initial.place, help="one of the two", related=related)
             raise Failed
         self.parts.initials.append(initial)
 
     def _state(self, statement: syntax.StateStatement) -> None:
         """A dynamic variable; its unit is said, or that of its initial value."""
         decl = statement.decl
-        unit = self.unit(statement.unit) if statement.unit else None
+        unit = self.context.unit(statement.unit) if statement.unit else None
         if unit is None:
             value = None if statement.value is None else self.resolver.resolve(statement.value)
             first = value.items[0] if isinstance(value, Vector) else value
             unit = si((first.dimension or NONE) if first is not None else NONE)
-        family = self.current.family(decl.name, self.shape(decl))
+        family = self.context.current.family(decl.name, self.context.shape(decl))
         self._enter_unknown(decl, "s", family, unit.dimension, None, False)
-        self.parts.states.append(State(family.name, family.whole, unit, self.place(decl.span)))
+        self.parts.states.append(State(family.name, family.whole, unit, self.context.place(decl.span)))
 
     def _definition(self, statement: syntax.LetStatement | syntax.OutputStatement | syntax.QuasiStatement) -> None:
         """let, output, quasi: resolved when they are read first."""
@@ -253,7 +256,9 @@ class Declarations(ParameterDeclarations):
         kind = {syntax.LetStatement: "let", syntax.OutputStatement: "output", syntax.QuasiStatement: "quasi"}[
             type(statement)
         ]
-        dimension = self.unit(statement.unit).dimension if isinstance(statement, syntax.QuasiStatement) else None
+        dimension = (
+            self.context.unit(statement.unit).dimension if isinstance(statement, syntax.QuasiStatement) else None
+        )
         at: tuple[str, ...] = ()
         implied = False
         # `for i in 1..n { let x[i] = ... }`: a formula with loop variables
@@ -272,19 +277,21 @@ class Declarations(ParameterDeclarations):
         # `for i in 1..n { let x = ... }`: known inside the loop alone
         elif self.resolver.bound_loops():
             at, implied = tuple(self.resolver.bound_loops()), True
-        place = self.place(decl.span)
+        place = self.context.place(decl.span)
         if kind == "quasi":
-            self.parts.quasis.append(self.current.family(decl.name).name)
-        self.enter(Definition(decl.name, kind, statement.value, at, dimension, self.current, place, decl.span, implied))
+            self.parts.quasis.append(self.context.current.family(decl.name).name)
+        self.context.enter(
+            Definition(decl.name, kind, statement.value, at, dimension, self.context.current, place, decl.span, implied)
+        )
 
     def domain(self, word: syntax.Word) -> DomainSymbol:
         """The domain of that name; E202."""
-        symbol = self.scope.find(word.name)
+        symbol = self.context.scope.find(word.name)
         if isinstance(symbol, DomainSymbol):
             return symbol
-        domains = [n for n in self.scope.names() if isinstance(self.scope.find(n), DomainSymbol)]
+        domains = [n for n in self.context.scope.names() if isinstance(self.context.scope.find(n), DomainSymbol)]
         near = nearest(word.name, domains)
-        if self.scope.is_broken(word.name):
+        if self.context.scope.is_broken(word.name):
             raise Failed
         help_ = f"'{near}'" if near else f"one of {', '.join(domains)}"
         help_ = habits.DOMAINS.get(word.name, help_)

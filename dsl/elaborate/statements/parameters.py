@@ -37,22 +37,25 @@ class Argument:
     place: Place
 
 
-class ParameterDeclarations(ElaborationContext):
+class ParameterDeclarations:
     """Declares parameters."""
+
+    def __init__(self, context: ElaborationContext) -> None:
+        self.context, self.resolver, self.parts = context, context.resolver, context.parts
 
     def declare_parameters(self, body: Body, given: dict[str, Argument]) -> None:
         """Parameters in the order of their dependence (the default of one may name another); given: arguments."""
-        said = len(self.report)
+        said = len(self.context.report)
         order = body.order if body.order is not None else self.by_dependence(self._first(body))
-        if len(self.report) == said:  # what is wrong is told of each instance
+        if len(self.context.report) == said:  # what is wrong is told of each instance
             body.order = order
         for statement, loops in order:
             try:
-                with self.inside(loops) if loops else nullcontext():
+                with self.context.inside(loops) if loops else nullcontext():
                     self._is_of_constants(body, statement, statement.decl.name in given)
                     self._parameter(statement, given.get(statement.decl.name))
             except Failed:
-                self.scope.broken.add(statement.decl.name)
+                self.context.scope.broken.add(statement.decl.name)
 
     def _first(self, body: Body) -> dict[str, Stated]:
         """The parameters of a body by their names; E106 where there are two of one."""
@@ -61,9 +64,9 @@ class ParameterDeclarations(ElaborationContext):
             assert isinstance(statement, syntax.ParamStatement)
             name = statement.decl.name
             if name in found:
-                related = (Related("first declared here", self.place(found[name][0].decl.span)),)
-                self.report.error(
-                    "E106", f"'{name}' is declared twice", self.place(statement.decl.span), related=related
+                related = (Related("first declared here", self.context.place(found[name][0].decl.span)),)
+                self.context.report.error(
+                    "E106", f"'{name}' is declared twice", self.context.place(statement.decl.span), related=related
                 )
                 continue
             found[name] = (statement, loops)
@@ -78,8 +81,8 @@ class ParameterDeclarations(ElaborationContext):
         for circle in circles:
             names = " or ".join(f"'{name}'" for name in circle[:-1])
             text, span = f"circular definition: {' -> '.join(circle)}", found[circle[-2]][0].span
-            self.report.error("E105", text, self.place(span), help=f"a value of its own for {names}")
-            self.scope.broken |= set(circle)
+            self.context.report.error("E105", text, self.context.place(span), help=f"a value of its own for {names}")
+            self.context.scope.broken |= set(circle)
         return tuple(found[name] for name in order)
 
     def _parameter(self, statement: syntax.ParamStatement, given: Argument | None) -> None:
@@ -87,11 +90,11 @@ class ParameterDeclarations(ElaborationContext):
         neither.
         """
         decl = statement.decl
-        place = self.place(decl.span)
-        unit = self.unit(statement.unit) if statement.unit else None
-        shape = self.shape(decl)
-        family = self.current.family(decl.name, shape)
-        own = self.resolver.loops[len(self.current.loops) :]
+        place = self.context.place(decl.span)
+        unit = self.context.unit(statement.unit) if statement.unit else None
+        shape = self.context.shape(decl)
+        family = self.context.current.family(decl.name, shape)
+        own = self.resolver.loops[len(self.context.current.loops) :]
         # `for i in 1..n { param R = ... }`
         if own and not decl.indices:
             raise self.resolver.fail("E806", f"'{decl.name}' needs its loop variable: {decl.name}[i]", decl.span)
@@ -112,7 +115,7 @@ class ParameterDeclarations(ElaborationContext):
             raise self.resolver.fail("E207", f"'{decl.name}' has neither a unit nor a default", decl.span, help=help_)
         around = tuple(n.data if n.op == "index" else f"_{k}" for k, n in enumerate(family.prefix))
         indices = (*around, *(loop.index for loop in own))
-        self.enter(ParameterSymbol(decl.name, family, unit.dimension, truth, place))
+        self.context.enter(ParameterSymbol(decl.name, family, unit.dimension, truth, place))
         self.parts.parameters[family.name] = Parameter(family.name, family.whole, unit, values, indices, place)
 
     def _values(
@@ -130,7 +133,7 @@ class ParameterDeclarations(ElaborationContext):
         for item in items:
             self._is_run_constant(item.node, statement, given)
         # `param k[1..3] = [1, 2]`
-        if not self.fills(value, shape):
+        if not self.context.fills(value, shape):
             message = f"'{statement.decl.name}' has {len(items)} values, which do not fit its shape"
             help_ = None if shape or not isinstance(value, Vector) else f"param {statement.decl.name}[1..{len(items)}]"
             if given is not None:
@@ -155,7 +158,7 @@ class ParameterDeclarations(ElaborationContext):
                 code = "E207" if what == "default" else "E214"
                 # an argument: the finding stands at the instance, and names both
                 if code == "E214":
-                    name = self.current.path or self.current.component
+                    name = self.context.current.path or self.context.current.component
                     want = unit.text if unit is not None else want
                     message = f"argument {statement.decl.name} of '{name}' is {is_}, wants {want}"
                     if help_ is None and isinstance(written, syntax.Name) and have != "dimensionless":
@@ -178,7 +181,7 @@ class ParameterDeclarations(ElaborationContext):
         if isinstance(value, syntax.Negative):
             value = value.operand
         if isinstance(value, syntax.QuantityLiteral):
-            found = read_unit(value.unit, self.scope, self.resolver.source, self.report)
+            found = read_unit(value.unit, self.context.scope, self.resolver.source, self.context.report)
             if found is not None:
                 return found
         return si(dimension)
@@ -198,7 +201,7 @@ class ParameterDeclarations(ElaborationContext):
         if given or statement.value is None:
             return
         names = [n for n in walk(statement.value) if isinstance(n, syntax.Name) and n.name not in PREDEFINED]
-        names = [n for n in names if self.scope.find(n.name) is None]
+        names = [n for n in names if self.context.scope.find(n.name) is None]
         if not names:
             return
         own = {n.index.name for n in walk(statement.value) if isinstance(n, syntax.Reduction)}
@@ -218,7 +221,7 @@ class ParameterDeclarations(ElaborationContext):
         """Report an error in a default, or in what an instance gives instead; raise what is returned."""
         if given is None:
             return self.resolver.fail(code, message, (statement.value or statement.decl).span, help=help)
-        where = Related(f"in component '{self.current.component}'", self.place(statement.decl.span))
+        where = Related(f"in component '{self.context.current.component}'", self.context.place(statement.decl.span))
         return self.resolver.fail(code, message, given.place, help=help, related=(where,))
 
 
