@@ -2,7 +2,7 @@
 
 A node family is cut where the reach of a terminal begins or ends; in each box so made every node is touched by the same
 branches, so its degree is known (language, 8.5).  A family that terminals reach by a table of indices is one cell; such
-families are connected in themselves (`gathered.py`).  A domain's ground is a node without indices.
+families are connected in themselves (`alike_elements.py`).  A domain's ground is a node without indices.
 """
 
 from __future__ import annotations
