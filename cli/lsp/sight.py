@@ -73,6 +73,7 @@ def item_at(document: Document, offset: int) -> syntax.TopLevel | None:
 def local(document: Document, offset: int) -> Iterator[Declared]:
     """The names that the model, component or scene around a place has in sight."""
     item = item_at(document, offset)
+    # in the body of a scene: the names of its model
     if isinstance(item, syntax.SceneDefinition) and offset > item.model.span.end:
         name = item.model.names[-1]
         item = next(
@@ -80,6 +81,7 @@ def local(document: Document, offset: int) -> Iterator[Declared]:
         )
     if isinstance(item, (syntax.ModelDefinition, syntax.ComponentDefinition)) and not _of_head(item, offset):
         yield from _declarations(document.source, item)
+    # in the body of a function or table: its arguments
     elif isinstance(item, (syntax.FunctionDefinition, syntax.TableDefinition)) and not _of_head(item, offset):
         for p in item.params:
             place = document.source.place(p.span.start, p.span.start + len(p.name))

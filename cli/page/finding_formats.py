@@ -103,12 +103,14 @@ def _result(d: Diagnostic, rule: int) -> dict[str, Any]:
     """A finding as a result of SARIF, with places, notes and the change that mends it."""
     text = d.message + (f"\nhelp: {d.help}" if d.help else "")
     result: dict[str, Any] = {"ruleId": d.code, "ruleIndex": rule, "level": d.severity, "message": {"text": text}}
+    # where it stands; a finding on the whole run has no place
     if d.place is not None:
         result["locations"] = [{"physicalLocation": _physical(d.place)}]
     if d.related:
         result["relatedLocations"] = [
             {"physicalLocation": _physical(r.place), "message": {"text": r.message}} for r in d.related
         ]
+    # a change that an editor may offer: what goes, what comes
     if d.edit is not None:
         change = _physical(d.edit.place)
         replacement = {"deletedRegion": change["region"], "insertedContent": {"text": d.edit.text}}

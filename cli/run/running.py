@@ -69,6 +69,7 @@ def run(request: RunRequest, report: Report, progress: Progress | None = None) -
     began = time.monotonic()
     keep_pages()
     check_tolerances(request)
+    # neither the model nor a file that is no trace is written over
     if request.output and request.file != "-" and _same(request.output, request.file):
         raise UsageError(f"-o {request.output} is the model itself")
     target = targets.target_of(request, report)
@@ -77,6 +78,7 @@ def run(request: RunRequest, report: Report, progress: Progress | None = None) -
     output = request.output or default_output(request.file, target.scene.name.name if target.scene else "")
     if Path(output).is_file() and not replaceable(output):
         raise UsageError(f"-o {output} exists and is no trace of sysdyn: give another name, or remove it")
+    # FILE.lock of a trade, where there is one
     request, locked = _apply_lock(request, target, report)
     with ex.fresh():
         prepared = ready(request, target, report)
@@ -143,11 +145,13 @@ def begin(prepared: Prepared, options: Options, report: Report, *, checked: bool
     if started is None or any(d.severity == "error" and d.code != "E909" for d in report):
         return None
     number = started.system.form.written
+    # more memory than there is
     if number * budget.STEPPED > budget.there():
         need, most = (budget.format_bytes(amount) for amount in (number * budget.STEPPED, budget.there()))
         text = f"a run of {number} unknowns needs {need}, and there are {most}"
         report.error("E119", text, prepared.network.place, help="fewer elements")
         return None
+    # no unknowns and nothing traced
     if number == 0 and not started.system.description.rows_of("observe"):
         message = "nothing is unknown in the model, and nothing is traced: a run would hold nothing"
         report.error("E607", message, prepared.network.place, help="coord, state or node; or a quantity that is traced")

@@ -103,6 +103,7 @@ class Compiled:
     def bound(self, numbers: Mapping[Any, Any]) -> Binding:
         """The text's binding with these numbers: by what follows from them, or anew."""
         compiled, binding = self.prepared.compiled, self.prepared.binding
+        # numbers of scalar parameters alone: what follows from their names is found once
         if all(isinstance(name, str) and np.ndim(value) == 0 for name, value in numbers.items()):
             names = frozenset(numbers)
             if names not in self.ways:
@@ -113,6 +114,7 @@ class Compiled:
             found = None if way is None else rebind(binding, way, {name: float(v) for name, v in numbers.items()})
             if found is not None:
                 return found
+        # arrays, sizes, or numbers that turn a decision: bound from the beginning
         return compiled.bind(numbers)
 
 
@@ -241,6 +243,7 @@ class Loaded:
                 prepared = ready(replace(self.request, settings=whole), self.target, report)
             if prepared is None:
                 raise ModelError(report.diagnostics)
+            # the oldest goes
             if len(self._compiled) >= KEPT:
                 self._compiled.pop(next(iter(self._compiled)))
             self._compiled[settings] = Compiled(prepared, nodes)

@@ -73,10 +73,12 @@ def hashes(target: Target) -> dict[str, str]:
         return path.relative_to(top).as_posix() if path.is_relative_to(top) else str(path)
 
     def take(path: Path, items: tuple[syntax.TopLevel, ...]) -> None:
+        # two files that import each other
         if name(path) in found:
             return
         found[name(path)] = hashlib.sha256(path.read_bytes()).hexdigest()
         for other in _files(path.parent, items):
+            # an import, with what it imports; else a table's file
             if other.is_file() and other.suffix == ".sd":
                 take(other, parse(SourceText.read(other))[0].items)
             elif other.is_file():

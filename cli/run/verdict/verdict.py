@@ -261,13 +261,16 @@ def differences(prepared: Prepared, cancelled: Iterable[Cancelled], report: Repo
 def note_rest(prepared: Prepared, started: Started, outcome: Outcome, report: Report) -> None:
     """N924 of a run in which nothing has moved, though what disturbs it would have grown by FOLDS powers of e."""
     system, state = started.system, started.state
+    # too large to look at, in motion at the start, or without a trace
     if system.unknowns > UNKICKED or moving(system, state) or (trace := outcome.traced) is None:
         return
+    # something moved
     if any(
         (trace[name].values != trace[name].values[0]).any() for name in trace.names if not name.startswith("audit.")
     ):
         return
     rate, name = growth(system, state)
+    # a pendulum upright: at rest, yet a disturbance grows by e^folds
     folds = rate * (outcome.reached - state.t)
     if folds > FOLDS:
         (shown,) = names_of(prepared.network, [name])
