@@ -61,7 +61,7 @@ ROOMS = {
 COMMANDS = {name: does for commands in ROOMS.values() for name, does in commands.items()}
 
 
-class Group(click.Group):
+class CommandGroup(click.Group):
     """Knows its commands by name; imports `sysdyn.cli.commands.<room>.<name>_command` when it is called."""
 
     def list_commands(self, ctx: click.Context) -> list[str]:
@@ -97,7 +97,7 @@ class Group(click.Group):
         return super().resolve_command(ctx, args)
 
 
-@click.group(cls=Group, context_settings={"help_option_names": ["-h", "--help"]})
+@click.group(cls=CommandGroup, context_settings={"help_option_names": ["-h", "--help"]})
 @click.version_option(__version__, prog_name="sysdyn")
 def group() -> None:
     """Compile and run models of physical systems written in .sd files.

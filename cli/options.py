@@ -45,7 +45,7 @@ class Setting(click.ParamType):  # type: ignore[type-arg]  # generic since click
 
 def complete_for_shell(context: click.Context, parameter: click.Parameter, begun: str) -> list[CompletionItem]:
     """What a shell completes; imported only when a shell asks."""
-    complete: Callable[..., list[CompletionItem]] = importlib.import_module("sysdyn.cli.completion").complete
+    complete: Callable[..., list[CompletionItem]] = importlib.import_module("sysdyn.cli.shell_completion").complete
     return complete(context, parameter, begun)
 
 

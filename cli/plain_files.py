@@ -24,6 +24,7 @@ class UnfitError(ValueError):
 
 def text_of(path: Path) -> str:
     """The text of a regular file of at most LONGEST bytes.  Raises OSError, UnfitError."""
+    # a pipe or a device could make the reader wait for ever
     if not stat.S_ISREG(path.stat().st_mode):
         raise UnfitError(f"{path}: no regular file: it is not read")
     handle = os.open(path, os.O_RDONLY | getattr(os, "O_NONBLOCK", 0) | getattr(os, "O_BINARY", 0))

@@ -12,15 +12,15 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from sysdyn.compiler.binding import again as again_
 from sysdyn.compiler.binding import binding as binding_
 from sysdyn.compiler.binding import columns as columns_
 from sysdyn.compiler.binding import manifest
-from sysdyn.compiler.binding.again import Way
+from sysdyn.compiler.binding import rebinding as again_
 from sysdyn.compiler.binding.binding import Binding, Overrides
 from sysdyn.compiler.binding.checks import check_energies
-from sysdyn.compiler.binding.columns import Columns, Floats
+from sysdyn.compiler.binding.columns import Floats, ParameterColumns
 from sysdyn.compiler.binding.counts import check_counts
+from sysdyn.compiler.binding.rebinding import Consequences
 from sysdyn.compiler.forms import descriptor
 from sysdyn.compiler.forms.conjugates import with_book_signs
 from sysdyn.compiler.forms.corners.frozen import frozen
@@ -30,22 +30,22 @@ from sysdyn.compiler.forms.integration import integrate
 from sysdyn.compiler.forms.kane import kane
 from sysdyn.compiler.forms.lagrangian import lagrangian
 from sysdyn.compiler.forms.legendre import legendre_transform
-from sysdyn.compiler.forms.meters.untraced import with_coordinates_observed
+from sysdyn.compiler.forms.meters.default_traces import with_coordinates_observed
 from sysdyn.compiler.forms.relative_coordinates import in_relative_coordinates, without_ignorable
 from sysdyn.compiler.forms.series_stores import with_efforts_of_stores
 from sysdyn.compiler.forms.steepness import add_scale_blocks
 from sysdyn.compiler.model import energies
 from sysdyn.compiler.model.energies import EnergyModel
 from sysdyn.compiler.model.mirror import refusal, word
+from sysdyn.compiler.network.alike_elements import gather_families
 from sysdyn.compiler.network.along import along
 from sysdyn.compiler.network.authors import in_author_names, split_finding
-from sysdyn.compiler.network.gathered import gather_families
 from sysdyn.compiler.network.primal import Step, primal
 from sysdyn.compiler.network.primal.precedence import outermost
 from sysdyn.compiler.network.quadratures import with_momenta
 from sysdyn.compiler.network.reflection import reflect, relabel
-from sysdyn.compiler.network.stated import FOREIGN, as_elements
 from sysdyn.compiler.network.verify import verify_network
+from sysdyn.compiler.network.written_energies import FOREIGN, as_elements
 from sysdyn.compiler.program import build
 from sysdyn.compiler.program import program as program_
 from sysdyn.compiler.program.emit_c import emit_c
@@ -119,11 +119,11 @@ class CompiledModel:
             raise ModelError(found)
         return binding
 
-    def way(self, binding: Binding, names: frozenset[str]) -> Way | None:
+    def way(self, binding: Binding, names: frozenset[str]) -> Consequences | None:
         """What follows from scalar parameters; None where more than numbers does."""
         return again_.way(self.network, self.energies, self.form, self.program, binding, names)
 
-    def columns(self, binding: Binding, varied: Mapping[str, Floats]) -> Columns | None:
+    def columns(self, binding: Binding, varied: Mapping[str, Floats]) -> ParameterColumns | None:
         """Bindings of many runs at once; None where each needs its own."""
         return columns_.columns(self.network, self.energies, self.form, self.program, binding, varied)
 
@@ -155,7 +155,7 @@ def compile_network(
 ) -> CompiledModel:
     """Lower a checked network; ModelError with everything the energies' rules found.
 
-    gather: what is written out by hand and alike as families (network/gathered.py).
+    gather: what is written out by hand and alike as families (network/alike_elements.py).
     traced: where the text traces nothing, every coordinate and every dynamic variable is.
     """
     try:

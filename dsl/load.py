@@ -29,25 +29,25 @@ from sysdyn.dsl.names.failures import Failed
 from sysdyn.dsl.names.resolve import Resolver
 from sysdyn.dsl.names.symbols import Space, nearest
 from sysdyn.dsl.parser.parse import parse
-from sysdyn.dsl.rules import bound_values, checks, graph_checks, laws
-from sysdyn.dsl.rules.asked import Asked
+from sysdyn.dsl.rules import bound_values, checks, graph_checks, law_rules
 from sysdyn.dsl.rules.claims import exact_claims
 from sysdyn.dsl.rules.floating import floating
+from sysdyn.dsl.rules.text_conditions import TextConditions
 from sysdyn.dsl.text.diagnostics import Diagnostic, Place, Report, SourceText
 from sysdyn.dsl.tree import syntax
 from sysdyn.values import dataclass
 
 if TYPE_CHECKING:
-    from sysdyn.dsl.elaborate.scenes.listing import Instance, Readable
+    from sysdyn.dsl.elaborate.scenes.listing import ListedInstance, Readable
 
 
 @dataclass(frozen=True, slots=True)
-class Document:
+class ParsedFile:
     """A parsed file with its models and scenes by name."""
 
     file: syntax.File
-    models: dict[str, syntax.Model]
-    scenes: dict[str, syntax.Scene]
+    models: dict[str, syntax.ModelDefinition]
+    scenes: dict[str, syntax.SceneDefinition]
 
 
 @dataclass(frozen=True, slots=True)
@@ -58,36 +58,36 @@ class Listing:
     inputs: tuple[str, ...]
     known: Values
     readable: tuple[Readable, ...]
-    instances: tuple[Instance, ...]
+    instances: tuple[ListedInstance, ...]
 
 
-def read(path: str | Path, report: Report, name: str | None = None) -> Document:
+def read(path: str | Path, report: Report, name: str | None = None) -> ParsedFile:
     """Parse a file; OSError where it cannot be read."""
     return document(SourceText.read(path, name), report)
 
 
-def document(source: SourceText, report: Report) -> Document:
+def document(source: SourceText, report: Report) -> ParsedFile:
     """Parse a text; what is wrong with its syntax goes to the report."""
     file, problems = parse(source)
     report.extend(problems)
-    models = {i.name.name: i for i in reversed(file.items) if isinstance(i, syntax.Model)}
-    scenes: dict[str, syntax.Scene] = {}
+    models = {i.name.name: i for i in reversed(file.items) if isinstance(i, syntax.ModelDefinition)}
+    scenes: dict[str, syntax.SceneDefinition] = {}
     for item in file.items:
-        if isinstance(item, syntax.Scene):
+        if isinstance(item, syntax.SceneDefinition):
             if item.name.name in scenes:
                 place = Place(source, item.name.span)
                 report.error("E106", f"scene '{item.name.name}' is declared twice", place)
             else:
                 scenes[item.name.name] = item
-    return Document(file, dict(reversed(models.items())), scenes)
+    return ParsedFile(file, dict(reversed(models.items())), scenes)
 
 
-def model_of(document: Document, scene: syntax.Scene, report: Report) -> syntax.Model | None:
+def model_of(document: ParsedFile, scene: syntax.SceneDefinition, report: Report) -> syntax.ModelDefinition | None:
     """The model that a scene is of; None after E902."""
     name = ".".join(scene.model.names)
     if name in document.models:
         return document.models[name]
-    broken = any(isinstance(i, syntax.Broken) and name in i.names for i in document.file.items)
+    broken = any(isinstance(i, syntax.BrokenStatement) and name in i.names for i in document.file.items)
     if not broken:
         near = nearest(name, document.models)
         help_ = f"nearest: '{near}'" if near else f"models here: {', '.join(document.models) or 'none'}"
@@ -99,9 +99,9 @@ def model_of(document: Document, scene: syntax.Scene, report: Report) -> syntax.
 
 
 def network(
-    document: Document,
-    model: syntax.Model,
-    scene: syntax.Scene | None,
+    document: ParsedFile,
+    model: syntax.ModelDefinition,
+    scene: syntax.SceneDefinition | None,
     report: Report,
     settings: Sequence[tuple[str, str]] = (),
     *,
@@ -133,7 +133,7 @@ def network(
 def _build_network(
     elaborator: Elaborator,
     reader: SceneReader,
-    scene: syntax.Scene | None,
+    scene: syntax.SceneDefinition | None,
     report: Report,
     *,
     required: bool,
@@ -161,21 +161,21 @@ def _build_network(
     # from here with the numbers of parameters: events of arrays one by one, sizes, the graph
     known = Values(elaborator.parts.parameters, reader.elements)
     if not report.failed and not _incomplete(report):
-        switches.expand_events(elaborator, known)
+        switches.expand_events(elaborator.context, known)
     bound_values.run(elaborator, known, report, reader.observations)
     if not report.failed and not _incomplete(report):
         graph_checks.run(elaborator, known, nodes_read(elaborator.parts), report)
         floating(elaborator, reader.observations, report)
     # laws are judged on the finished network, in which alike sizes have one name
     found = with_literal_ranges(with_common_sizes(_result(elaborator, reader, read_scene)), known.number)
-    laws.run(found, known, report)
+    law_rules.run(found, known, report)
     return None if report.failed or _incomplete(report) else found
 
 
 def _elaborate(
-    document: Document,
-    model: syntax.Model,
-    scene: syntax.Scene | None,
+    document: ParsedFile,
+    model: syntax.ModelDefinition,
+    scene: syntax.SceneDefinition | None,
     report: Report,
     settings: Sequence[tuple[str, str]],
     levels: Sequence[tuple[str, str]],
@@ -184,7 +184,7 @@ def _elaborate(
     """The model with the levels and settings asked for: its names, elements and statements."""
     files = FileScope(document.file, report)
     elaborator = Elaborator(files, model, report)
-    elaborator.moved = frozenset(moved)
+    elaborator.inputs.moved = frozenset(moved)
     # names of the model first: scene and command line refer to them
     elaborator.names()
     reader = SceneReader(elaborator)
@@ -197,7 +197,7 @@ def _elaborate(
     # the command line wins over the scene
     for path, name in levels:
         text = SourceText("--level", f"{path}={name}")
-        elaborator.levels[path] = (name, text.place(0, len(text.text)))
+        elaborator.instances.levels[path] = (name, text.place(0, len(text.text)))
     # components, with their nodes and branches
     elaborator.elements()
     _unused_levels(elaborator, report)
@@ -225,22 +225,22 @@ def at_authors(network: Network, found: Iterable[Diagnostic]) -> tuple[Diagnosti
 
 
 def conditions_on_numbers(
-    document: Document,
-    model: syntax.Model,
-    scene: syntax.Scene | None,
+    document: ParsedFile,
+    model: syntax.ModelDefinition,
+    scene: syntax.SceneDefinition | None,
     settings: Sequence[tuple[str, str]] = (),
     levels: Sequence[tuple[str, str]] = (),
-) -> Asked:
+) -> TextConditions:
     """What a text without errors asks of its numbers."""
     with deep(), budget.drawn(document.file.source.text):
         elaborator, reader = _elaborate(document, model, scene, Report(), settings, levels)
-        return Asked(elaborator, reader.elements)
+        return TextConditions(elaborator, reader.elements)
 
 
 def listing(
-    document: Document,
-    model: syntax.Model,
-    scene: syntax.Scene | None,
+    document: ParsedFile,
+    model: syntax.ModelDefinition,
+    scene: syntax.SceneDefinition | None,
     report: Report,
     levels: Sequence[tuple[str, str]] = (),
 ) -> Listing | None:
@@ -262,19 +262,21 @@ def listing(
         return None
 
 
-def _unread(elaborator: Elaborator, scene: syntax.Scene | None) -> bool:
+def _unread(elaborator: Elaborator, scene: syntax.SceneDefinition | None) -> bool:
     """Whether a statement of the model, of a component in it, of the scene, or one that it needs could not be read."""
-    once = {id(body): body for _, body in elaborator.bodies}.values()
+    once = {id(body): body for _, body in elaborator.instances.bodies}.values()
     bodies = [statement for body in once for statement, _ in body]
     said = [*bodies, *(scene.body if scene else ())]
-    within = (action for s in said if isinstance(s, (syntax.When, syntax.Every)) for action in s.actions)
-    return elaborator.files.scope.missed or any(isinstance(s, syntax.Broken) for s in (*said, *within))
+    within = (
+        action for s in said if isinstance(s, (syntax.WhenStatement, syntax.EveryStatement)) for action in s.actions
+    )
+    return elaborator.files.scope.missed or any(isinstance(s, syntax.BrokenStatement) for s in (*said, *within))
 
 
 def _unused_levels(elaborator: Elaborator, report: Report) -> None:
     """A level for a path that is no component is a mistake, not a wish."""
-    known = {space.path for space, _ in elaborator.bodies} if elaborator.levels else set[str]()
-    for path, (name, place) in elaborator.levels.items():
+    known = {space.path for space, _ in elaborator.instances.bodies} if elaborator.instances.levels else set[str]()
+    for path, (name, place) in elaborator.instances.levels.items():
         unread = elaborator.space.scope.is_broken(re.split(r"[.[]", path)[0]) or elaborator.files.scope.missed
         if path not in known and not report.failed and not unread:
             near, whole = nearest(path, known), re.sub(r"\[[^]]*\]", "", path)
@@ -316,7 +318,7 @@ def _result(elaborator: Elaborator, reader: SceneReader, scene: Scene | None) ->
         discretes=frozenset(parts.discretes),
         events=tuple(parts.events),
         switches=tuple(parts.switches),
-        levels=tuple(elaborator.choices.values()),
+        levels=tuple(elaborator.instances.choices.values()),
         read=nodes_read(parts),
         literal=elaborator.resolver.sizes_read,
     )
@@ -336,7 +338,7 @@ def _incomplete(report: Report) -> bool:
     return any(d.code == "N608" for d in report)
 
 
-def constant(document: Document, text: str, dimension: Dimension, name: str, report: Report) -> float | None:
+def constant(document: ParsedFile, text: str, dimension: Dimension, name: str, report: Report) -> float | None:
     """A constant expression of the command line in SI; a bare number is in SI units; None after reporting."""
     source = SourceText(name, f"const value = {text}\n")
     # `--at ""`
@@ -346,7 +348,7 @@ def constant(document: Document, text: str, dimension: Dimension, name: str, rep
     inner = Report()
     file, problems = parse(source)
     inner.extend(problems)
-    items = [i for i in file.items if isinstance(i, syntax.Const)]
+    items = [i for i in file.items if isinstance(i, syntax.ConstDefinition)]
     # a text that is no single expression, as `1; const b = 2`
     if inner.failed or "\n" in text or len(items) != 1 or len(file.items) != 1:
         unit = common(dimension) if dimension else ""
@@ -371,14 +373,14 @@ def constant(document: Document, text: str, dimension: Dimension, name: str, rep
     return found
 
 
-def _set(name: str, value: str, report: Report) -> list[tuple[SourceText, syntax.Set]]:
+def _set(name: str, value: str, report: Report) -> list[tuple[SourceText, syntax.SetStatement]]:
     """One `--set NAME=VALUE` of the command line, read as the statement of a scene."""
     text = f"scene command_line of model {{\n  set {name} = {value}\n}}\n"
     source = SourceText("--set", text)
     inner = Report()
     parsed = document(source, inner)
     statements = [s for scene in parsed.scenes.values() for s in scene.body]
-    if len(inner) or "\n" in name + value or len(statements) != 1 or not isinstance(statements[0], syntax.Set):
+    if len(inner) or "\n" in name + value or len(statements) != 1 or not isinstance(statements[0], syntax.SetStatement):
         report.extend(inner)
         if not inner.failed:
             report.error("E910", f"--set {name}={value} is not NAME=VALUE", source.place(0, 0))
@@ -386,12 +388,12 @@ def _set(name: str, value: str, report: Report) -> list[tuple[SourceText, syntax
     return [(source, statements[0])]
 
 
-def _trace(expression: str, report: Report) -> tuple[SourceText, syntax.Trace] | None:
+def _trace(expression: str, report: Report) -> tuple[SourceText, syntax.TraceStatement] | None:
     """One `--outputs` of the command line, read as the statement of a scene; None after reporting."""
     source = SourceText("--outputs", f"scene command_line of model {{\n  trace {expression}\n}}\n")
     inner = Report()
     statements = [s for scene in document(source, inner).scenes.values() for s in scene.body]
-    if len(inner) or "\n" in expression or len(statements) != 1 or not isinstance(statements[0], syntax.Trace):
+    if len(inner) or "\n" in expression or len(statements) != 1 or not isinstance(statements[0], syntax.TraceStatement):
         report.extend(inner)
         if not inner.failed:
             report.error("E905", f"--outputs {expression[:40]}: one expression is wanted", source.place(0, 0))
@@ -399,6 +401,6 @@ def _trace(expression: str, report: Report) -> tuple[SourceText, syntax.Trace] |
     return source, statements[0]
 
 
-def _space(document: Document, source: SourceText) -> Space:
+def _space(document: ParsedFile, source: SourceText) -> Space:
     scope = FileScope(document.file, Report()).scope
     return Space("", scope, scope, source)

@@ -38,7 +38,7 @@ ROUND_OFF = 10.0 * EPS
 
 
 @dataclass(frozen=True, slots=True)
-class NotMet:
+class Shortfall:
     """What a run missed.
 
     what: accuracy, energy or invariants; value beyond limit: relative for accuracy (value None: no estimate), in `unit`
@@ -69,7 +69,7 @@ class Judgement:
     """
 
     judged: tuple[str, ...]
-    not_met: tuple[NotMet, ...]
+    not_met: tuple[Shortfall, ...]
     conserved: tuple[Balance, ...] = ()
     turnover: float = 0.0
 
@@ -170,7 +170,7 @@ def judge(
     asked = accurate and method != "euler"  # what is no number is missed whatever was asked
     misses = [e for e in missed if asked or e.undefined]
     found = [
-        NotMet("accuracy", e.error, e.asked, e.quantity, e.time, undefined=e.undefined, blurred=e.blurred)
+        Shortfall("accuracy", e.error, e.asked, e.quantity, e.time, undefined=e.undefined, blurred=e.blurred)
         for e in misses
     ]
     if method == "euler":
@@ -185,5 +185,5 @@ def judge(
             if limit < b.value and left_open is not None:
                 limit = max(limit, float(left_open()[k]))
             if not b.value <= limit:
-                found.append(NotMet(what, b.value, limit, b.element.label, b.first_beyond(limit), b.unit, b.element))
+                found.append(Shortfall(what, b.value, limit, b.element.label, b.first_beyond(limit), b.unit, b.element))
     return Judgement(tuple(judged), tuple(found), conserved, turned_over(balances))

@@ -11,11 +11,11 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from sysdyn.cli.analysis.asked import Found
-from sysdyn.cli.analysis.linear import Linear, linearise
+from sysdyn.cli.analysis.linearisation import Linearisation, linearise
+from sysdyn.cli.analysis.operating_point import Found
 from sysdyn.cli.analysis.states import state_of
 from sysdyn.cli.page.columns import align, complex_text
-from sysdyn.cli.run.request.asked import Request
+from sysdyn.cli.run.request.run_request import RunRequest
 from sysdyn.dsl.model import expression as ex
 from sysdyn.dsl.model.units import si_text
 from sysdyn.dsl.text.diagnostics import Report
@@ -54,7 +54,7 @@ class Locus:
     failed: tuple[tuple[float, str], ...]
 
 
-def answers(linear: Linear) -> tuple[Answer, ...]:
+def answers(linear: Linearisation) -> tuple[Answer, ...]:
     """Of every output by every input, over one range of frequencies and one of times."""
     if not linear.transfers:
         return ()
@@ -63,7 +63,7 @@ def answers(linear: Linear) -> tuple[Answer, ...]:
     return tuple(_answer(linear, t, low, high, end) for t in linear.transfers)
 
 
-def _answer(linear: Linear, transfer: Transfer, low: float, high: float, end: float) -> Answer:
+def _answer(linear: Linearisation, transfer: Transfer, low: float, high: float, end: float) -> Answer:
     """Frequency response, margins and step response of one transfer function."""
     time, step = responses.step(linear.reduced, transfer, end)
     return Answer(
@@ -81,6 +81,7 @@ def answer_to_json(answer: Answer, kinds: Sequence[str]) -> dict[str, Any]:
     """The object of --json."""
     f, m = answer.frequencies, answer.margins
     found: dict[str, Any] = {"output": answer.output, "input": answer.input}
+    # margins are read off the frequency response, bode or nyquist
     if "bode" in kinds or "nyquist" in kinds:
         found["margins"] = {"gain": m.gain, "w_phase": m.w_phase, "phase": m.phase, "w_gain": m.w_gain}
     if "bode" in kinds:
@@ -95,6 +96,7 @@ def answer_to_json(answer: Answer, kinds: Sequence[str]) -> dict[str, Any]:
 def answer_to_text(answer: Answer, kinds: Sequence[str]) -> str:
     """Tables of a few rows each."""
     f, parts = answer.frequencies, [answer.label]
+    # a few rows spread over the frequencies; --json has all
     places = np.unique(np.linspace(0, f.w.size - 1, ROWS).round().astype(int))
     if "bode" in kinds:
         rows = [[f"{f.w[k]:.5g}", f"{f.magnitude[k]:.5g}", f"{f.phase[k]:.5g}"] for k in places]
@@ -118,7 +120,7 @@ def _margins(m: Margins) -> list[str]:
     return found
 
 
-def locus(request: Request, name: str, along: Sequence[float], *, rest: bool, found: Found) -> Locus:
+def locus(request: RunRequest, name: str, along: Sequence[float], *, rest: bool, found: Found) -> Locus:
     """Eigenvalues over values (SI) of a parameter: each is compiled in, its state found anew."""
     sets, kept, failed = [], [], []
     for value in along:
@@ -132,7 +134,9 @@ def locus(request: Request, name: str, along: Sequence[float], *, rest: bool, fo
     return Locus(name, units[name.partition("[")[0]], np.array(kept), responses.branches(sets), tuple(failed))
 
 
-def _eigenvalues(request: Request, name: str, value: float, *, rest: bool) -> tuple[NDArray[np.complex128] | None, str]:
+def _eigenvalues(
+    request: RunRequest, name: str, value: float, *, rest: bool
+) -> tuple[NDArray[np.complex128] | None, str]:
     """Eigenvalues where a parameter has another value, or why there are none."""
     settings = (*((n, v) for n, v in request.settings if n != name), (name, repr(value)))
     report = Report()

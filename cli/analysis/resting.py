@@ -7,11 +7,11 @@ from dataclasses import field, replace
 from typing import Any
 
 import numpy as np
-from sysdyn.cli.analysis.asked import Found, compile_target, of_nodes
-from sysdyn.cli.analysis.linear import linearise, loose_of
+from sysdyn.cli.analysis.linearisation import linearise, loose_of
+from sysdyn.cli.analysis.operating_point import Found, compile_target, of_nodes
 from sysdyn.cli.analysis.states import model_at_rest, resting
 from sysdyn.cli.page.columns import complex_text
-from sysdyn.cli.run.request.asked import Request
+from sysdyn.cli.run.request.run_request import RunRequest
 from sysdyn.cli.run.request.targets import still
 from sysdyn.dsl.model.units import Unit, quantity
 from sysdyn.dsl.text.diagnostics import Report
@@ -64,6 +64,7 @@ class Equilibrium:
     def to_text(self, number: int) -> str:
         """A few lines for the terminal."""
         lines = [f"{number}  {self._judgement()}"]
+        # q, s and e, and flows that are not zero
         shown = [
             f"{name} = {value + 0.0:.9g}{'' if unit == '1' else f' {unit}'}"
             for (name, value), kind, unit in zip(self.values.items(), self.kinds, self.units, strict=True)
@@ -78,6 +79,7 @@ class Equilibrium:
             lines.append(f"   {', '.join(f'{name} {how}' for name, how in list(self.rest.holding.items())[:MOST])}")
         if self.rest.free:
             lines.append(f"   one of a continuum; left open: {', '.join(self.rest.free[:6])}")
+        # slowest decay, or fastest growth, first
         if self.judged is not None and self.judged.modes:
             modes = sorted(self.judged.modes, key=lambda m: -m.eigenvalue.real)[:6]
             rest = [f"... {len(self.judged.modes) - 6} more"] if len(self.judged.modes) > 6 else []
@@ -107,7 +109,7 @@ class Equilibrium:
 
 
 def equilibria(
-    request: Request, tries: int, report: Report, progress: Progress | None = None
+    request: RunRequest, tries: int, report: Report, progress: Progress | None = None
 ) -> tuple[Found, tuple[Equilibrium, ...], str] | None:
     """The model and its states of rest, and what is to be said where it has none; None where the report says why it has
     none to be asked of.

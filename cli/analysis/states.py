@@ -6,10 +6,17 @@ from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
-from sysdyn.cli.analysis.asked import Found, Inputs, compile_target, model_at_instant, model_at_start, of_contents
+from sysdyn.cli.analysis.operating_point import (
+    Found,
+    Inputs,
+    compile_target,
+    model_at_instant,
+    model_at_start,
+    of_contents,
+)
 from sysdyn.cli.run.events import plan
 from sysdyn.cli.run.prepare import Prepared
-from sysdyn.cli.run.request.asked import Request
+from sysdyn.cli.run.request.run_request import RunRequest
 from sysdyn.cli.run.request.targets import Target
 from sysdyn.dsl.text.diagnostics import Report
 from sysdyn.runtime.events.plan import Plan
@@ -30,7 +37,7 @@ TRIES = 20
 
 
 def state_of(
-    request: Request, outputs: tuple[str, ...] | None, inputs: Inputs, report: Report, *, rest: bool
+    request: RunRequest, outputs: tuple[str, ...] | None, inputs: Inputs, report: Report, *, rest: bool
 ) -> tuple[Found | None, str | None]:
     """The model at the state asked, its inputs free to move; else None, the report says why, and what stopped a run or
     a search.

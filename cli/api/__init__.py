@@ -20,19 +20,19 @@ from sysdyn.api.linear import Linearised, NoState, linearised_at, resting
 from sysdyn.cli.analysis.resting import Equilibrium
 from sysdyn.cli.failures import UsageError
 from sysdyn.cli.run.check.checking import check_target
-from sysdyn.cli.run.many.loaded import Loaded, shortly, text_of
+from sysdyn.cli.run.many.reusable_model import Loaded, shortly, text_of
 from sysdyn.cli.run.request import targets
-from sysdyn.cli.run.request.asked import Request
+from sysdyn.cli.run.request.run_request import RunRequest
 from sysdyn.cli.run.running import Ran, run
 from sysdyn.cli.sweep.one_run import Runner
-from sysdyn.cli.sweep.opened import Sweep
+from sysdyn.cli.sweep.sweep_results import Sweep
 from sysdyn.distribution import warn_of_other
-from sysdyn.dsl import alone
 from sysdyn.dsl import load as load_
+from sysdyn.dsl import unused_components
 from sysdyn.dsl.model import expression as ex
 from sysdyn.dsl.text.diagnostics import Diagnostic, ModelError, Report
 from sysdyn.dsl.text.source import SourceText
-from sysdyn.runtime.judgement import NotMet as Missed
+from sysdyn.runtime.judgement import Shortfall
 from sysdyn.runtime.model.failures import SolverFailure
 from sysdyn.runtime.trace.trace import Trace
 
@@ -63,7 +63,7 @@ __all__ = [
 class NotMet(Exception):  # noqa: N818 (a name of the house)
     """A run that ended, but did not meet what it judges itself by; trace: complete; not_met: what was missed."""
 
-    def __init__(self, trace: Trace, not_met: tuple[Missed, ...], findings: tuple[Diagnostic, ...]) -> None:
+    def __init__(self, trace: Trace, not_met: tuple[Shortfall, ...], findings: tuple[Diagnostic, ...]) -> None:
         self.trace, self.not_met = trace, not_met
         super().__init__("; ".join(d.message for d in findings if d.code in ("E920", "E921")))
 
@@ -246,18 +246,18 @@ def check(text: str, name: str = "<text>") -> list[Diagnostic]:
     for target in targets.all_targets(document, report):
         with ex.fresh():
             check_target(target, report)
-    for _, own in alone.check_unused_components(document):
+    for _, own in unused_components.check_unused_components(document):
         report.extend(own)
     return list(report.diagnostics)
 
 
-def _request(path: object, options: dict[str, Any]) -> Request:
+def _request(path: object, options: dict[str, Any]) -> RunRequest:
     path = written("path", path)
     given = dict(options)
     settings = given.pop("set", given.pop("settings", None))
     settings = () if settings is None else settings
     given["settings"] = tuple((name, text_of(value)) for name, value in _settings(settings).items())
-    return _make_request(Request, path, **_changes(given))
+    return _make_request(RunRequest, path, **_changes(given))
 
 
 def _settings(settings: Any) -> dict[str, Any]:
@@ -271,9 +271,9 @@ def _settings(settings: Any) -> dict[str, Any]:
     return found
 
 
-def _make_request(make: Any, *arguments: Any, **options: Any) -> Request:
+def _make_request(make: Any, *arguments: Any, **options: Any) -> RunRequest:
     try:
-        request: Request = make(*arguments, **options)
+        request: RunRequest = make(*arguments, **options)
     except TypeError as error:
         raise UsageError(str(error).replace("Request.__init__()", "simulate()")) from None
     check_choices(request.formulation, request.backend, request.index)

@@ -8,16 +8,16 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from sysdyn.cli.export.asked import formed_of, network_of, report_impossible
 from sysdyn.cli.export.files import manifest_of
+from sysdyn.cli.export.index_form import formed_of, network_of, report_impossible
 from sysdyn.cli.export.index_parameters import index_parameters
-from sysdyn.cli.export.layout import AUDIT, Formed, state_jacobian, tables
 from sysdyn.cli.export.naming import elements
+from sysdyn.cli.export.tabulation import AUDIT, Formed, state_jacobian, tables
 from sysdyn.cli.failures import UsageError
 from sysdyn.cli.options import BACKENDS, FORMULATIONS, INDICES
-from sysdyn.cli.run.many.loaded import KEPT, place_of, shortly
+from sysdyn.cli.run.many.reusable_model import KEPT, place_of, shortly
 from sysdyn.cli.run.prepare import prepare
-from sysdyn.cli.run.request.asked import Request
+from sysdyn.cli.run.request.run_request import RunRequest
 from sysdyn.dsl.model import expression as ex
 from sysdyn.dsl.text.diagnostics import Diagnostic, ModelError, Report
 from sysdyn.runtime.integrate.underlying import Underlying
@@ -211,7 +211,7 @@ def compile_model(
     )
     check_choices(formulation, backend, index)
     scene, model = (name if name is None else written("scene or model", name) for name in (scene, model))
-    report, request = Report(), Request(written("path", path), scene, model, backend=backend, no_prune=no_prune)
+    report, request = Report(), RunRequest(written("path", path), scene, model, backend=backend, no_prune=no_prune)
     # nodes of the text go with it
     with ex.fresh():
         network = network_of(request, report)

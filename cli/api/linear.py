@@ -5,14 +5,14 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
-from sysdyn.cli.analysis import linear as linear_
+from sysdyn.cli.analysis import linearisation as linear_
 from sysdyn.cli.analysis.answers import Answer, answers
-from sysdyn.cli.analysis.files import arrays
-from sysdyn.cli.analysis.linear import inputs_of, linearise
+from sysdyn.cli.analysis.linear_files import arrays
+from sysdyn.cli.analysis.linearisation import inputs_of, linearise
 from sysdyn.cli.analysis.resting import Equilibrium, equilibria
 from sysdyn.cli.analysis.states import state_of
 from sysdyn.cli.failures import UsageError
-from sysdyn.cli.run.request.asked import Request
+from sysdyn.cli.run.request.run_request import RunRequest
 from sysdyn.dsl.model import expression as ex
 from sysdyn.dsl.text.diagnostics import ModelError, Report
 
@@ -32,7 +32,7 @@ class Linearised:
     moving: the state is not at rest; energies [modes, stores]: shares of each mode's energy by element.
     """
 
-    def __init__(self, found: linear_.Linear) -> None:
+    def __init__(self, found: linear_.Linearisation) -> None:
         self._found = found
         self.matrices: dict[str, NDArray[Any]] = arrays(found)
         self.states, self.inputs, self.outputs = found.reduced.names, found.inputs, found.outputs
@@ -97,7 +97,7 @@ def _without_dots(names: Sequence[str]) -> list[str]:
 
 
 def linearised_at(
-    request: Request,
+    request: RunRequest,
     inputs: tuple[str, ...] | None,
     outputs: tuple[str, ...] | None,
     *,
@@ -114,7 +114,7 @@ def linearised_at(
         return Linearised(linearise(found, inputs_of(found.target, found.prepared, inputs), request.index or "3"))
 
 
-def resting(request: Request, tries: int) -> tuple[Equilibrium, ...]:
+def resting(request: RunRequest, tries: int) -> tuple[Equilibrium, ...]:
     """States of rest of a request; raises ModelError."""
     report = Report()
     with ex.fresh():

@@ -12,7 +12,19 @@ from collections.abc import Sequence
 
 import numpy as np
 from sysdyn.cli.compare.diffing import headline, sentence
-from sysdyn.cli.page.curves import BOTTOM, COLUMNS, HEIGHT, LEFT, RIGHT, TOP, WIDTH, Frame, axes, frame_around, outline
+from sysdyn.cli.page.curves import (
+    BOTTOM,
+    COLUMNS,
+    HEIGHT,
+    LEFT,
+    RIGHT,
+    TOP,
+    WIDTH,
+    PlotFrame,
+    axes,
+    frame_around,
+    outline,
+)
 from sysdyn.cli.page.document import document, table
 from sysdyn.cli.page.unit_text import conversion
 from sysdyn.runtime.comparison.curve import Curve, Floats, bernstein, cells_at
@@ -116,7 +128,7 @@ def _values(source: Source, name: str, x: Floats, scale: float) -> Floats:
     return np.where((x >= time[0]) & (x <= time[-1]), found, np.nan)
 
 
-def _svg(frame: Frame, c: Compared, label: str, body: Sequence[str], key: str, time_unit: str) -> str:
+def _svg(frame: PlotFrame, c: Compared, label: str, body: Sequence[str], key: str, time_unit: str) -> str:
     parts = [f'<svg viewBox="0 0 {WIDTH} {HEIGHT}" role="img" aria-label="{html.escape(label, quote=True)}">']
     parts += [*axes(frame, time_unit, c.unit), *body]
     if frame.low <= c.worst.time <= frame.high:

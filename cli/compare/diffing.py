@@ -14,7 +14,7 @@ from sysdyn.cli.page.unit_text import conversion
 from sysdyn.runtime.comparison.compare import compare
 from sysdyn.runtime.comparison.curve import Floats
 from sysdyn.runtime.comparison.recorded import Recorded
-from sysdyn.runtime.comparison.verdict import About, Compared, Event, Source, Tolerance, Verdict
+from sysdyn.runtime.comparison.verdict import About, Compared, Source, Tolerance, TraceEvent, Verdict
 from sysdyn.runtime.trace.opening import regular
 from sysdyn.values import dataclass
 
@@ -60,7 +60,7 @@ class Common:
         return self.whole.time_unit
 
     @property
-    def events(self) -> tuple[Event, ...]:
+    def events(self) -> tuple[TraceEvent, ...]:
         """Events."""
         return self.whole.events
 
@@ -93,13 +93,16 @@ def sentence(c: Compared) -> str:
     """What is wrong with one quantity."""
     w = c.worst
     match c.status:
+        # beyond the tube
         case "differs":
             unit = "" if c.unit == "1" else f" {c.unit}"
             values = f"{w.test:.9g}{unit}, reference {w.reference:.9g}{unit}, limit {c.limit:.3g}{unit}"
             return f"{c.name}{_time_text(c)} is {_times(w.ratio)} over the limit: {values}" + (c.note and f"; {c.note}")
+        # another span, or other events
         case "coverage" | "events":
             over = f", {_times(w.ratio)} over the limit" if math.isfinite(w.ratio) else ""
             return f"{c.name}: {c.note}{over}"
+        # one has it and the other does not; another unit; not finite
         case _:
             words = {"unit": "is of another unit", "nonfinite": "cannot be within a limit"}
             word = words.get(c.status, f"is {c.status}")

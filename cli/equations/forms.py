@@ -5,10 +5,10 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 import numpy as np
-from sysdyn.cli.analysis.asked import model_at_start
-from sysdyn.cli.analysis.linear import inputs_of, linearise
+from sysdyn.cli.analysis.linearisation import inputs_of, linearise
+from sysdyn.cli.analysis.operating_point import model_at_start
 from sysdyn.cli.run.prepare import Prepared
-from sysdyn.cli.run.request.asked import Request
+from sysdyn.cli.run.request.run_request import RunRequest
 from sysdyn.cli.run.request.targets import Target
 from sysdyn.compiler.equations.book import (
     CO_WORDS,
@@ -41,7 +41,7 @@ MOST = 400
 
 
 @dataclass(frozen=True, slots=True)
-class Content:
+class FormContent:
     """What a form consists of; more: row families that were left out; counted: degrees of freedom and index."""
 
     functions: tuple[Function, ...] = ()
@@ -55,7 +55,9 @@ OF_COORDINATES = ("matrices", "underlying", "port_hamiltonian", "efforts")
 """Forms that a model of dynamic variables alone does not have."""
 
 
-def content_of(target: Target, prepared: Prepared, form: str, request: Request, report: Report) -> Content | None:
+def content_of(
+    target: Target, prepared: Prepared, form: str, request: RunRequest, report: Report
+) -> FormContent | None:
     """The content of a --form; None where the report says why there is none.  Raises NoSuchEquations."""
     if form in OF_COORDINATES and not any(f.kind == "f" for f in prepared.compiled.form.families):
         raise NoSuchEquations("the model has no coordinates: see --form descriptor")
@@ -66,40 +68,40 @@ def content_of(target: Target, prepared: Prepared, form: str, request: Request, 
     return found
 
 
-def _content(target: Target, prepared: Prepared, form: str, request: Request, report: Report) -> Content | None:
+def _content(target: Target, prepared: Prepared, form: str, request: RunRequest, report: Report) -> FormContent | None:
     """Functions, equations and matrices of one form; NoSuchEquations where the model does not have it."""
     compiled = prepared.compiled
     algebra = algebra_of(compiled.form, [p.name for p in compiled.network.parameters if not p.shape])
     match form:
         case "matrices":
-            return Content(matrices=matrices(algebra, compiled.form), counted=tuple(_count_lines(compiled.form)))
+            return FormContent(matrices=matrices(algebra, compiled.form), counted=tuple(_count_lines(compiled.form)))
         case "canonical":
             function, rates = canonical(algebra, compiled.functions, compiled.form)
-            return Content((function, variation(algebra, function, compiled.form)), tuple(rates))
+            return FormContent((function, variation(algebra, function, compiled.form)), tuple(rates))
         case "underlying":
             found_ = tuple(underlying(algebra, compiled.form))
-            return Content(equations=found_, counted=tuple(_count_lines(compiled.form)))
+            return FormContent(equations=found_, counted=tuple(_count_lines(compiled.form)))
         case "port_hamiltonian":
             function, view = written(algebra, port_hamiltonian(compiled.energies, compiled.form))
-            return Content((function,), matrices=view)
+            return FormContent((function,), matrices=view)
         # by class, with the transforms of T* and V beside
         case "efforts":
             found = tuple(classes(algebra, compiled.energies, compiled.form))
             beside, _ = legendre_transform(compiled.energies, compiled.network.parameters)
             own = {"W", *compiled.energies.functions}
             more = (f for f in functions(algebra, beside) if f.name not in own)
-            return Content((*functions(algebra, compiled.energies), *more), found)
+            return FormContent((*functions(algebra, compiled.energies), *more), found)
         case "elements":
             shown = tuple(elements(algebra, prepared.network))
             if not shown:
                 raise NoSuchEquations("the text has no stores and dissipators between nodes: see --form efforts")
-            return Content(equations=shown)
+            return FormContent(equations=shown)
         case "linear":
             return _linear(target, prepared, request, report)
         # the descriptor form, up to a number of rows
         case _:
             rows = sum(r.block in WORDS for r in compiled.form.rows) - MOST
-            return Content(
+            return FormContent(
                 tuple(functions(algebra, compiled.functions)),
                 tuple(equations(algebra, compiled.functions, compiled.form, MOST)),
                 more=max(rows, 0),
@@ -125,7 +127,7 @@ def _count_lines(form: DescriptorForm) -> Iterator[str]:
         yield f"  all once more for the rates of what has none yet: {last}"
 
 
-def _linear(target: Target, prepared: Prepared, request: Request, report: Report) -> Content | None:
+def _linear(target: Target, prepared: Prepared, request: RunRequest, report: Report) -> FormContent | None:
     """The equations x' = A x + B u about the start, in numbers; x and u are deviations.
 
     A state of the reduction may be x - D u - D1 u' (runtime/linear/tangent.py): of x itself it is
@@ -163,7 +165,7 @@ def _linear(target: Target, prepared: Prepared, request: Request, report: Report
         rate = var(node.data[0], node.data[1], *node.args, order=1)
         right = tuple(Summed((), term) for term in terms)
         lines.append(Equation("linear", name, None, (Summed((), rate),), right))
-    return Content(equations=tuple(lines))
+    return FormContent(equations=tuple(lines))
 
 
 def unknown_node(system: System, place: int) -> Node:

@@ -212,6 +212,7 @@ def _sum(node: Node, args: list[tuple[str, int]]) -> str:
     parts = [(c, _parenthesize(a, PRODUCT)) for c, a in zip(coefficients, args, strict=True)]
     parts.sort(key=lambda part: part[0] < 0)  # a sum that can begin without a sign does
     for c, text in parts:
+        # no + before the first; a - always
         if pieces or c < 0:
             pieces.append(mo("−" if c < 0 else "+"))
         if abs(c) != 1.0:

@@ -4,20 +4,20 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 
-from sysdyn.cli.equations.forms import Content
+from sysdyn.cli.equations.expression_writers import ExpressionWriter, Latex, TextWriter
+from sysdyn.cli.equations.forms import FormContent
 from sysdyn.cli.equations.letters import Letters
-from sysdyn.cli.equations.writing import Latex, Text, Writer
 from sysdyn.compiler.equations.book import (
     CO_WORDS,
     REFLECTED,
     WORDS,
-    Effort,
+    EffortTerms,
     Equation,
     Function,
     Summed,
 )
 from sysdyn.compiler.equations.matrices import Matrix, unknowns
-from sysdyn.compiler.equations.order import Order
+from sysdyn.compiler.equations.order import FactorOrder
 from sysdyn.compiler.model.terms import Nest
 from sysdyn.compiler.pipeline import CompiledModel
 from sysdyn.dsl.model.expression import Node, index
@@ -26,7 +26,7 @@ from sysdyn.values import dataclass
 
 
 @dataclass(frozen=True, slots=True)
-class Line:
+class EquationLine:
     """left = right, in text and LaTeX; condition: for which indices; label: of the row; place: in the author's
     text; more: added to the right side of the line before.
     """
@@ -58,8 +58,8 @@ class Sheet:
     belong to; more: equations that were left out.
     """
 
-    functions: tuple[Line, ...]
-    equations: tuple[Line, ...]
+    functions: tuple[EquationLine, ...]
+    equations: tuple[EquationLine, ...]
     legend: tuple[tuple[str, str, int], ...]
     more: int = 0
     counted: tuple[str, ...] = ()
@@ -101,19 +101,19 @@ def _array(entries: Sequence[Sequence[str]]) -> str:
     return "\\begin{bmatrix} " + " \\\\ ".join(" & ".join(row) for row in entries) + " \\end{bmatrix}"
 
 
-def _block(lines: Sequence[Line]) -> str:
+def _block(lines: Sequence[EquationLine]) -> str:
     wide = max(len(line.text[0]) for line in lines)
     return "\n".join(_row(line, wide) for line in lines)
 
 
-def _row(line: Line, wide: int) -> str:
+def _row(line: EquationLine, wide: int) -> str:
     """One line; a matrix takes several."""
     head = f"{line.text[0].rjust(wide)} {'+' if line.more else '='} "
     text = line.text[1].replace("\n", "\n" + " " * len(head))
     return head + text + (f"    {line.condition[0]}" if line.condition[0] else "")
 
 
-def _latex(line: Line) -> str:
+def _latex(line: EquationLine) -> str:
     condition = f" \\qquad {line.condition[1]}" if line.condition[1] else ""
     sign = "&\\quad {} + " if line.more else "&= "
     return f"  {line.latex[0]} {sign}{line.latex[1]}{condition}"
@@ -126,11 +126,14 @@ class Sheets:
         self.compiled = compiled
         parameters = [p.name for p in compiled.network.parameters]
         self.letters = Letters(compiled.form, named, parameters, compiled.network.switches)
-        order = Order(parameters)
-        self.writers: tuple[Writer, Writer] = (Text(self.letters, order), Latex(self.letters, order))
+        order = FactorOrder(parameters)
+        self.writers: tuple[ExpressionWriter, ExpressionWriter] = (
+            TextWriter(self.letters, order),
+            Latex(self.letters, order),
+        )
         self.complementary = compiled.form.formulation.startswith("co_")
 
-    def sheet(self, content: Content) -> Sheet:
+    def sheet(self, content: FormContent) -> Sheet:
         """What is printed, in both alphabets."""
         lines = [self._matrix(m) for m in content.matrices] + [self.line(e) for e in content.equations]
         legend = tuple(self.legend()) if content.equations else ((self._flows(), "", 0),)
@@ -139,32 +142,32 @@ class Sheets:
         said = ((self.writers[0].symbol(letter, ()), what, line) for letter, what, line in self.letters.slipping())
         return Sheet(functions, tuple(lines), legend, content.more, content.counted, tuple(said))
 
-    def _matrix(self, matrix: Matrix) -> Line:
+    def _matrix(self, matrix: Matrix) -> EquationLine:
         text, latex = ([[self._entry(w, e) for e in row] for row in matrix.rows] for w in self.writers)
         texts = (matrix.name, _grid(text)), (_NAMES.get(matrix.name, matrix.name), _array(latex))
-        return Line("matrix", matrix.name, *texts, ("", ""), None)
+        return EquationLine("matrix", matrix.name, *texts, ("", ""), None)
 
     def _flows(self) -> str:
         order = ", ".join(self.writers[0].expression(n) for n in unknowns(self.compiled.form, "f"))
         return f"f = ({order})"
 
-    def _entry(self, writer: Writer, terms: Sequence[Node]) -> str:
+    def _entry(self, writer: ExpressionWriter, terms: Sequence[Node]) -> str:
         return writer.sum_of([Summed((), term) for term in terms])
 
-    def function_line(self, function: Function) -> Line:
+    def function_line(self, function: Function) -> EquationLine:
         """A state function or virtual work."""
         texts = tuple(self._function(writer, function) for writer in self.writers)
         name = REFLECTED[function.name] if self.complementary else function.name
         name = f"δ{name}" if function.efforts else name
         latex = name.replace("δ", "\\delta ").replace("*", "^{*}")
-        return Line("function", name, (name, texts[0]), (latex, texts[1]), ("", ""), None)
+        return EquationLine("function", name, (name, texts[0]), (latex, texts[1]), ("", ""), None)
 
-    def _function(self, writer: Writer, function: Function) -> str:
+    def _function(self, writer: ExpressionWriter, function: Function) -> str:
         if not function.efforts:
             return writer.sum_of(function.terms)
         return _sum_text([self._effort(writer, effort) for effort in function.efforts], writer.minus)
 
-    def _effort(self, writer: Writer, effort: Effort) -> str:
+    def _effort(self, writer: ExpressionWriter, effort: EffortTerms) -> str:
         """Q delta q, summed."""
         text = writer.sum_of([Summed((), term) for term in effort.terms])
         single = len(effort.terms) == 1 and (effort.terms[0].op != "sum" or len(effort.terms[0].args) == 1)
@@ -173,7 +176,7 @@ class Sheets:
             text = writer.total("sum", loop, text)
         return text
 
-    def line(self, equation: Equation) -> Line:
+    def line(self, equation: Equation) -> EquationLine:
         """An equation in both alphabets."""
         words = WORDS | CO_WORDS if self.complementary else WORDS
         pairs = [(w.sum_of(equation.left), w.sum_of(equation.right)) for w in self.writers]
@@ -187,9 +190,9 @@ class Sheets:
         if equation.kind == "element":  # the edge of Paynter's diagram
             edge = equation.owner.rpartition("(")[2].removesuffix(")")
             ends = (", ".join(filter(None, (edge, ends[0]))), ", \\ ".join(filter(None, (edge, ends[1]))))
-        return Line(equation.kind, label, pairs[0], pairs[1], ends, equation.place, equation.more)
+        return EquationLine(equation.kind, label, pairs[0], pairs[1], ends, equation.place, equation.more)
 
-    def _condition(self, writer: Writer, where: Nest, fixed: Sequence[tuple[int, Node]]) -> str:
+    def _condition(self, writer: ExpressionWriter, where: Nest, fixed: Sequence[tuple[int, Node]]) -> str:
         pieces = []
         for loop in where:
             first, last = writer.expression(loop.first), writer.expression(loop.last)

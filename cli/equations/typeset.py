@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from itertools import groupby
 
-from sysdyn.cli.equations.forms import Content
+from sysdyn.cli.equations.forms import FormContent
 from sysdyn.cli.equations.mathml import Typesetter, math, mi, mo, row
 from sysdyn.cli.page.document import document, escape
 from sysdyn.compiler.equations.book import CO_WORDS, REFLECTED, WORDS, Equation, Function, Summed
@@ -71,7 +71,7 @@ def matrix(found: Matrix, types: Typesetter) -> str:
     return math(name, mo("="), mo("["), f"<mtable>{''.join(lines)}</mtable>", mo("]"))
 
 
-def page(title: str, content: Content, compiled: CompiledModel) -> str:
+def page(title: str, content: FormContent, compiled: CompiledModel) -> str:
     """A page of its own."""
     complementary = compiled.form.formulation.startswith("co_")
     names, switches = (c.name for c in compiled.energies.coordinates), compiled.network.switches

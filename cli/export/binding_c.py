@@ -12,7 +12,7 @@ from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
-from sysdyn.cli.export.tables import Assembled, Call, Start, State, Tables
+from sysdyn.cli.export.tables import Assembled, BlockCall, ExportTables, StartTables, StateSelection
 from sysdyn.compiler.binding.following import Following
 from sysdyn.compiler.forms.descriptor import DescriptorForm
 from sysdyn.compiler.program.emit_c import emit_c
@@ -68,7 +68,7 @@ typedef struct {
 """
 
 
-def binding_c(tables: Tables, following: Following, form: DescriptorForm) -> str:
+def binding_c(tables: ExportTables, following: Following, form: DescriptorForm) -> str:
     """The text of binding.c."""
     names = (*ASSEMBLY, *(ALGEBRA if tables.state else ()))
     parts = [
@@ -98,7 +98,7 @@ def _core(name: str) -> str:
     return f"/* ---- {name} ---- */\n" + re.sub(r'(?m)^#include "[^"]*"\n', "", text)
 
 
-def _prototypes(tables: Tables) -> Iterable[str]:
+def _prototypes(tables: ExportTables) -> Iterable[str]:
     """Prototypes of the blocks."""
     systems = [tables.system, *([tables.start.system] if tables.start else [])]
     found: dict[str, None] = {}
@@ -171,7 +171,7 @@ def _system(name: str, system: Assembled) -> Iterable[str]:
     yield f"static const sd_system {name}_form = {{\n    {', '.join(said)}\n}};"
 
 
-def _call(name: str, k: int, call: Call) -> str:
+def _call(name: str, k: int, call: BlockCall) -> str:
     dy, dyd = (
         f"sd_{call.block}_{part}" if slots.size else "NULL" for part, slots in (("dy", call.dy), ("dyd", call.dyd))
     )
@@ -180,7 +180,7 @@ def _call(name: str, k: int, call: Call) -> str:
     return f"    {{sd_{call.block}_rows, {dy}, {dyd}, {frame}, {numbers}, 0, 0, NULL, NULL}},"
 
 
-def _whole(tables: Tables) -> Iterable[str]:
+def _whole(tables: ExportTables) -> Iterable[str]:
     """All tables."""
     system = tables.system
     pattern = tables.state or system
@@ -232,7 +232,7 @@ def _whole(tables: Tables) -> Iterable[str]:
         yield from _start(start)
 
 
-def _state(state: State, system: Assembled) -> Iterable[str]:
+def _state(state: StateSelection, system: Assembled) -> Iterable[str]:
     """Tables of the explicit form: the matrix of rates and multipliers, and the places of the state."""
     chosen, calls = state.selection, len(system.calls)
     yield _MATRIX
@@ -257,7 +257,7 @@ def _state(state: State, system: Assembled) -> Iterable[str]:
     yield f"static const sd_matrix_form matrix_form = {{{sizes}, {arrays.format(order=order)}, m_magnitude}};"
 
 
-def _output_tables(tables: Tables) -> Iterable[str]:
+def _output_tables(tables: ExportTables) -> Iterable[str]:
     if not tables.outputs:
         return
     yield ints("audit_at", tables.audit_at)
@@ -269,7 +269,7 @@ def _output_tables(tables: Tables) -> Iterable[str]:
         yield ints("audit_to", tables.audit.to)
 
 
-def _groups(tables: Tables) -> Iterable[str]:
+def _groups(tables: ExportTables) -> Iterable[str]:
     kinds = {"parameter": "SD_PARAMETER", "initial": "SD_INITIAL", "constant": "SD_CONSTANT"}
     lines = []
     for k, group in enumerate(tables.groups):
@@ -280,7 +280,7 @@ def _groups(tables: Tables) -> Iterable[str]:
     yield "static const sd_group groups[] = {\n" + "\n".join(lines or ["    {0}"]) + "\n};"
 
 
-def _start(start: Start) -> Iterable[str]:
+def _start(start: StartTables) -> Iterable[str]:
     """Tables of the consistent start: its system, known values, and the stages that are tried in turn."""
     system = start.system
     yield from _system("b", system)

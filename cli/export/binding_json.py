@@ -7,9 +7,9 @@ from dataclasses import fields, is_dataclass
 from typing import Any
 
 import numpy as np
-from sysdyn.cli.export.layout import Formed
 from sysdyn.cli.export.naming import outputs, rows, unknowns
-from sysdyn.cli.export.tables import Tables
+from sysdyn.cli.export.tables import ExportTables
+from sysdyn.cli.export.tabulation import Formed
 from sysdyn.compiler.binding.following import Following
 from sysdyn.dsl.model.network import Network
 from sysdyn.dsl.model.units import si_text
@@ -17,7 +17,7 @@ from sysdyn.dsl.model.units import si_text
 VERSION = 1
 
 
-def binding_json(formed: Formed, tables: Tables, following: Following) -> str:
+def binding_json(formed: Formed, tables: ExportTables, following: Following) -> str:
     """The text of binding.json: one line a key."""
     prepared = formed.prepared
     network = prepared.compiled.network

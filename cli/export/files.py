@@ -11,8 +11,8 @@ from sysdyn.cli import whole_files
 from sysdyn.cli.export.binding_c import binding_c, header
 from sysdyn.cli.export.binding_json import binding_json
 from sysdyn.cli.export.index_parameters import index_parameters
-from sysdyn.cli.export.layout import Formed, tables
 from sysdyn.cli.export.naming import rows, unknowns
+from sysdyn.cli.export.tabulation import Formed, tables
 from sysdyn.cli.failures import UsageError
 from sysdyn.compiler.binding.following import Following
 from sysdyn.compiler.program.emit_numpy import emit_numpy

@@ -7,8 +7,8 @@ from __future__ import annotations
 
 import numpy as np
 from sysdyn.cli.export.binding_json import parameters
-from sysdyn.cli.export.layout import Formed
-from sysdyn.cli.export.tables import Tables
+from sysdyn.cli.export.tables import ExportTables
+from sysdyn.cli.export.tabulation import Formed
 from sysdyn.compiler.binding.following import Following
 from sysdyn.compiler.forms.descriptor import DescriptorForm
 from sysdyn.dsl.model.calculus import derivative
@@ -23,7 +23,7 @@ MOST = 60
 _INERTIAL = ("dynamics", "momentum", "lambda", "gamma")
 
 
-def index_parameters(formed: Formed, tables: Tables, following: Following) -> list[str]:
+def index_parameters(formed: Formed, tables: ExportTables, following: Following) -> list[str]:
     """Names of the parameters that may change the index, in the order of the manifest."""
     compiled = formed.prepared.compiled
     names = [p.name for p in compiled.network.parameters]
@@ -47,6 +47,7 @@ def _changes(formed: Formed, places: dict[str, slice], following: Following, nam
     """Whether the index at the start is another one, or none, where a parameter is zero."""
     prepared, written = formed.prepared, formed.written
     arrays = dict(prepared.arrays)
+    # other parameters are formulas of it: all are bound anew
     if any(name in used for used in following.follows.values()):
         try:
             arrays = prepared.arrays_of(prepared.compiled.bind({name: 0.0}))
@@ -59,6 +60,7 @@ def _changes(formed: Formed, places: dict[str, slice], following: Following, nam
     if written.left_out:
         other = other.without(written.left_out)
     jy, jyd = other.jacobian(formed.state.t, *formed.state.for_form(other))
+    # 1/p: no number at zero
     if not (np.isfinite(jy).all() and np.isfinite(jyd).all()):
         return True
     return index_of(other, formed.state)[0] != formed.facts.index

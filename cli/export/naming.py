@@ -9,8 +9,8 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from sysdyn.cli.export.layout import Formed
-from sysdyn.cli.export.tables import Tables
+from sysdyn.cli.export.tables import ExportTables
+from sysdyn.cli.export.tabulation import Formed
 from sysdyn.compiler.binding.manifest import family_entry, where
 from sysdyn.compiler.model.mirror import family_name, letter, word
 from sysdyn.dsl.text.diagnostics import Place
@@ -118,6 +118,6 @@ def _labels(name: str, family: Family | RowFamily, kind: str, place: Place | Non
     return [{"label": label, "kind": kind, "file": file, "line": line} for label, file, line in each]
 
 
-def outputs(tables: Tables) -> list[dict[str, Any]]:
+def outputs(tables: ExportTables) -> list[dict[str, Any]]:
     """Traced quantities in the order of w; row: of block observe."""
     return [{"name": output.name, "unit": output.unit, "row": output.place} for output in tables.outputs]

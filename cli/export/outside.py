@@ -285,11 +285,13 @@ def sd_start(p: Any = None) -> tuple[_Floats, _Floats]:
     """Consistent (y, yd) at t0: initial values hold, guesses move least.  StartError where none is found."""
     m = _model()
     p = m.parameters(p)
+    # the parameters of the compilation: its own start
     if np.array_equal(p, m.p):
         return m.y0.copy(), m.yd0.copy()
     if m.tables["start"] is None:
         raise StartError("the model is too large to be started anew here: compile it with these parameters")
     y, yd = (item[: m.tables["written"]] for item in _Seeking(m, np.array(p)).found())
+    # the export has the states of an explicit form alone
     if m.state is not None:
         y, yd = _slopes(m, m.said["t0"], y[m.state["places"]], p)
         return y[m.state["places"]], yd[m.state["places"]]

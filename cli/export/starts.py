@@ -7,7 +7,7 @@ is given anew are the initial values, by formulas.
 from __future__ import annotations
 
 import numpy as np
-from sysdyn.cli.export.tables import Stage, Start, assembly_tables
+from sysdyn.cli.export.tables import Stage, StartTables, assembly_tables
 from sysdyn.runtime.model.description import Floats, Ints
 from sysdyn.runtime.model.system import System
 from sysdyn.runtime.start.least import problem_of
@@ -18,14 +18,14 @@ LARGEST = 1500
 """Unknowns and rows up to which a start is sought outside: with full matrices."""
 
 
-def start_tables(system: System, state: ConsistentState) -> Start | None:
+def start_tables(system: System, state: ConsistentState) -> StartTables | None:
     """The problem of a start; None where it is too large, or has rows that only the runtime forms."""
     starter = Starter(system)
     if starter.summed or max(starter.equations.unknowns, starter.settled.rows) > LARGEST:
         return None
     x = starter.unknowns(state.t, state.y, state.yd)
     problem = problem_of(starter, state.t, x, x, rows=starter.every, free=starter.free)
-    return Start(
+    return StartTables(
         assembly_tables(starter.settled),
         starter.n,
         starter.rates.astype(np.int32),

@@ -17,7 +17,7 @@ NOTHING: Ints = np.zeros(0, dtype=np.int32)
 
 
 @dataclass(frozen=True, slots=True)
-class Call:
+class BlockCall:
     """A block with its tables at, to, and the places in the pattern of its entries."""
 
     block: str
@@ -36,7 +36,7 @@ class Assembled:
     extended: int
     column: Ints
     row: Ints
-    calls: tuple[Call, ...]
+    calls: tuple[BlockCall, ...]
     k_row: Ints
     k_q: Ints
     k_f: Ints
@@ -65,7 +65,7 @@ class Stage:
 
 
 @dataclass(frozen=True, slots=True)
-class Start:
+class StartTables:
     """How a consistent start is sought at other parameters: x = (y, yd at `rates`).
 
     written: unknowns of y, those of the start alone among them; known, scale, weight [x]: x as it was bound; how far it
@@ -85,7 +85,7 @@ class Start:
 
 
 @dataclass(frozen=True, slots=True)
-class State:
+class StateSelection:
     """Index form 0: the differential unknowns of the full layout, and what is solved for (`underlying.h` of the core).
 
     column, row: pattern of dF/dy + cj dF/dyd, from the components of the matrix.
@@ -98,7 +98,7 @@ class State:
 
 
 @dataclass(frozen=True, slots=True)
-class Output:
+class TracedOutput:
     """A traced quantity: its name, unit (SI), row of block observe."""
 
     name: str
@@ -107,7 +107,7 @@ class Output:
 
 
 @dataclass(frozen=True, slots=True)
-class Group:
+class FollowingGroup:
     """Values that follow from given parameters (compiler/binding/following.py); target: place in p or y."""
 
     block: str
@@ -118,7 +118,7 @@ class Group:
 
 
 @dataclass(frozen=True, slots=True)
-class Tables:
+class ExportTables:
     """All of one exported model.
 
     y0, yd0, scale, differential [unknowns of the form]; full_y, full_yd [unknowns of the layout as assembled]; written:
@@ -141,14 +141,14 @@ class Tables:
     followed: int
     at: Ints
     system: Assembled
-    state: State | None
-    start: Start | None
-    groups: tuple[Group, ...]
+    state: StateSelection | None
+    start: StartTables | None
+    groups: tuple[FollowingGroup, ...]
     structural: Ints
-    outputs: tuple[Output, ...]
-    observe: Call | None
+    outputs: tuple[TracedOutput, ...]
+    observe: BlockCall | None
     observed: int
-    audit: Call | None
+    audit: BlockCall | None
     audited: int
     audit_at: Ints
 
@@ -157,7 +157,7 @@ def assembly_tables(system: System) -> Assembled:
     """The tables of a system."""
     form, slots = system.form, system.slots
     calls = tuple(
-        Call(planned.block, planned.at, planned.to, slots[2 * k + 2], slots[2 * k + 3])
+        BlockCall(planned.block, planned.at, planned.to, slots[2 * k + 2], slots[2 * k + 3])
         for k, planned in enumerate(form.calls)
     )
     # rows that a held unknown replaces

@@ -33,7 +33,7 @@ class Accepted:
 
 
 @dataclass(frozen=True, slots=True)
-class Golden:
+class GoldenScene:
     """One scene of a model as it is kept.
 
     folder: of its golden.toml; model: file of the model; scene: "" for a model without one.  rtol, atol, tau [s]: the
@@ -73,36 +73,38 @@ class Golden:
         return self.folder / f"{self.name}.json"
 
 
-class Unreadable(click.ClickException):
+class UnreadableGolden(click.ClickException):
     """A golden.toml that is none (exit 5)."""
 
 
-def read(folder: Path) -> tuple[Golden, ...]:
+def read(folder: Path) -> tuple[GoldenScene, ...]:
     """All goldens of one model's folder.  Raises Unreadable, OSError."""
     path = folder / BOOK
     try:
         data = tables(path)
     except UnfitError as error:
-        raise Unreadable(str(error)) from error
+        raise UnreadableGolden(str(error)) from error
     try:
         if data["version"] != VERSION:
-            raise Unreadable(f"{path}: version {data['version']!r} is not known: a newer sysdyn wrote it")
+            raise UnreadableGolden(f"{path}: version {data['version']!r} is not known: a newer sysdyn wrote it")
         model = Path(os.path.normpath(folder / str(data["model"])))
         if not inside(folder / str(data["model"]), project(folder.parent)):
-            raise Unreadable(f"{path}: its model {data['model']!r} is outside of the project, {project(folder.parent)}")
+            raise UnreadableGolden(
+                f"{path}: its model {data['model']!r} is outside of the project, {project(folder.parent)}"
+            )
         return tuple(_entry(folder, model, name, item) for name, item in data["scenes"].items())
     except KeyError as error:
-        raise Unreadable(f"{path}: {error} is missing: sysdyn golden record writes it") from error
+        raise UnreadableGolden(f"{path}: {error} is missing: sysdyn golden record writes it") from error
     except (TypeError, ValueError, AttributeError) as error:
-        raise Unreadable(f"{path}: {error}") from error
+        raise UnreadableGolden(f"{path}: {error}") from error
 
 
-def _entry(folder: Path, model: Path, name: str, item: dict[str, Any]) -> Golden:
+def _entry(folder: Path, model: Path, name: str, item: dict[str, Any]) -> GoldenScene:
     """A golden of the book's table; raises ValueError, KeyError or TypeError where it is damaged."""
     if Path(name).name != name or name in ("", ".", ".."):
         raise ValueError(f"'{name}' is no name of a scene")
     numbers = {k: float(item[k]) for k in ("rtol", "atol", "tau", "accuracy", "error", "energy", "constraints")}
-    return Golden(
+    return GoldenScene(
         folder=folder,
         model=model,
         name=name,
@@ -115,7 +117,7 @@ def _entry(folder: Path, model: Path, name: str, item: dict[str, Any]) -> Golden
     )
 
 
-def find(root: Path, names: Sequence[str] = ()) -> tuple[Golden, ...]:
+def find(root: Path, names: Sequence[str] = ()) -> tuple[GoldenScene, ...]:
     """Goldens below a folder: all, or those of the names (pendulum, pendulum/swing, pendulum.sd)."""
     found = [g for path in sorted(root.glob(f"*/{BOOK}")) for g in read(path.parent)]
     if not found:
@@ -129,7 +131,7 @@ def find(root: Path, names: Sequence[str] = ()) -> tuple[Golden, ...]:
     return tuple(dict.fromkeys(chosen)) if names else tuple(found)
 
 
-def write(golden: Golden) -> None:
+def write(golden: GoldenScene) -> None:
     """Put one golden into its folder's golden.toml, the others as they are."""
     path = golden.folder / BOOK
     others = [g for g in (read(golden.folder) if path.is_file() else ()) if g.name != golden.name]
@@ -143,7 +145,7 @@ def write(golden: Golden) -> None:
     whole_files.replace(path, "\n".join(lines) + "\n")
 
 
-def _lines(g: Golden) -> list[str]:
+def _lines(g: GoldenScene) -> list[str]:
     """Lines of golden.toml about one golden, numbers as they are read back."""
     lines = [
         f"[scenes.{toml_text(g.name)}]",

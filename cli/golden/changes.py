@@ -8,9 +8,9 @@ from collections.abc import Sequence
 from html import escape
 
 from sysdyn.cli.compare.diffing import differences, headline, table
-from sysdyn.cli.golden.book import Golden
-from sysdyn.cli.golden.checking import Case, load_golden, tolerance_of
-from sysdyn.cli.golden.recording import Recorded
+from sysdyn.cli.golden.book import GoldenScene
+from sysdyn.cli.golden.golden_checks import Case, load_golden, tolerance_of
+from sysdyn.cli.golden.recording import GoldenRecord
 from sysdyn.cli.golden.structures import describe_change
 from sysdyn.cli.page.document import document
 from sysdyn.cli.page.document import table as html_table
@@ -21,7 +21,7 @@ BESIDE = ("structure", "meter", "run")
 """Kinds of findings that are not in a case's own page of quantities."""
 
 
-def what_changed(golden: Golden, wanted: Golden, found: Recorded) -> tuple[str | None, str]:
+def what_changed(golden: GoldenScene, wanted: GoldenScene, found: GoldenRecord) -> tuple[str | None, str]:
     """(one line, all of it) of what differs between what is kept and what was found; None: nothing."""
     lines, first = [], None
     # the traces
@@ -71,6 +71,7 @@ def page(cases: Sequence[Case]) -> str:
         parts.append(_summary([(f'<a href="#case{k}">{escape(_title(c))}</a>', c) for k, c in enumerate(wrong)]))
     for k, case in enumerate(wrong):
         parts.append(f'<h2 id="case{k}">{escape(_title(case))}</h2>')
+        # findings that the case's own page of quantities does not have
         beside = [t for name, t in case.cases if t is not None and name.partition(":")[0] in BESIDE]
         if beside:
             parts.append('<ul class="bad">' + "".join(f"<li>{escape(text)}</li>" for text in beside) + "</ul>")

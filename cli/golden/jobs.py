@@ -6,9 +6,9 @@ import time
 from collections.abc import Callable, Iterator, Sequence
 
 from sysdyn.cli.failures import UsageError
-from sysdyn.cli.golden.book import Golden
-from sysdyn.cli.golden.checking import INPUT_OUTPUT, SOLVER, Case, Mutant, check, mutate, request_of
-from sysdyn.cli.golden.recording import Recorded, Refused, record
+from sysdyn.cli.golden.book import GoldenScene
+from sysdyn.cli.golden.golden_checks import INPUT_OUTPUT, SOLVER, Case, Mutant, check, mutate, request_of
+from sysdyn.cli.golden.recording import GoldenRecord, Refused, record
 from sysdyn.cli.golden.runs import Stopped
 from sysdyn.cli.run.many.crew import Lost, each
 from sysdyn.runtime.comparison.verdict import Incomparable
@@ -16,22 +16,22 @@ from sysdyn.values import dataclass
 
 
 @dataclass(frozen=True, slots=True)
-class Asked:
+class GoldenJob:
     """A golden, and how it is checked."""
 
-    golden: Golden
+    golden: GoldenScene
     formulations: tuple[str, ...]
     methods: tuple[str, ...]
     backends: tuple[str, ...]
     with_page: bool
 
 
-def check_golden(asked: Asked) -> list[Case]:
+def check_golden(asked: GoldenJob) -> list[Case]:
     """The cases of a golden."""
     return list(check(asked.golden, asked.formulations, asked.methods, asked.backends, asked.with_page))
 
 
-def mutate_golden(golden: Golden) -> tuple[list[Mutant], tuple[int, str] | None]:
+def mutate_golden(golden: GoldenScene) -> tuple[list[Mutant], tuple[int, str] | None]:
     """The mutants of a golden, as many as could be made; exit code and reason where they could not all be."""
     found: list[Mutant] = []
     try:
@@ -43,7 +43,7 @@ def mutate_golden(golden: Golden) -> tuple[list[Mutant], tuple[int, str] | None]
     return found, None
 
 
-def record_again(golden: Golden) -> tuple[list[str], Recorded | tuple[int, str]]:
+def record_again(golden: GoldenScene) -> tuple[list[str], GoldenRecord | tuple[int, str]]:
     """What is said while a golden is recorded anew, and the record; exit code and reason where there is none."""
     said: list[str] = []
     only = golden.formulations[0] if len(golden.formulations) == 1 else None
@@ -59,7 +59,7 @@ def record_again(golden: Golden) -> tuple[list[str], Recorded | tuple[int, str]]
 
 
 def in_processes(
-    asked: Sequence[Asked], jobs: int | None, checked: Callable[[Asked], list[Case]] = check_golden
+    asked: Sequence[GoldenJob], jobs: int | None, checked: Callable[[GoldenJob], list[Case]] = check_golden
 ) -> Iterator[list[Case]]:
     """The cases of each golden, in their order; checked: what makes them, in another process perhaps."""
     began = time.monotonic()

@@ -16,9 +16,9 @@ from typing import Any
 import numpy as np
 from sysdyn.cli.compare.diffing import common, differences, sentence
 from sysdyn.cli.failures import OF_RUNS
-from sysdyn.cli.golden.runs import APART, Run, Stopped, between, run
+from sysdyn.cli.golden.runs import APART, GoldenRun, Stopped, between, run
 from sysdyn.cli.run.many.crew import Lost, each
-from sysdyn.cli.run.request.asked import Request
+from sysdyn.cli.run.request.run_request import RunRequest
 from sysdyn.runtime.comparison.arrays import Arrays
 from sysdyn.runtime.comparison.curve import Curve, Flags, Floats, bernstein, cells_at
 from sysdyn.runtime.comparison.thinning import estimated_rates, rounded, thinned
@@ -63,7 +63,7 @@ class Refused(Exception):  # noqa: N818 (no fault of the program)
 
 
 @dataclass(frozen=True, slots=True)
-class Recorded:
+class GoldenRecord:
     """What a record holds.  error: relative, measured, and by which run; tau [s]; accuracy: of the runs of `check`;
     energy [J], constraints: bounds; structure: by formulation.
     """
@@ -78,7 +78,7 @@ class Recorded:
     method: str
 
 
-def record(request: Request, rtol: float, atol: float, say: Say, jobs: int | None = 1) -> Recorded:
+def record(request: RunRequest, rtol: float, atol: float, say: Say, jobs: int | None = 1) -> GoldenRecord:
     """Measure a scene.  request: file, scene, settings; jobs: processes that run its formulations, None: where it pays.
 
     Raises Refused, Stopped, UsageError.
@@ -119,7 +119,7 @@ def record(request: Request, rtol: float, atol: float, say: Say, jobs: int | Non
         say(f"{claim}; a golden holds what is, right or wrong")
     # bounds of ledgers, from all runs
     meters = [base, *runs, *found, *_others(request, base, checked)]
-    return Recorded(
+    return GoldenRecord(
         golden,
         error,
         tau,
@@ -131,7 +131,7 @@ def record(request: Request, rtol: float, atol: float, say: Say, jobs: int | Non
     )
 
 
-def _others(request: Request, base: Run, accuracy: float) -> list[Run]:
+def _others(request: RunRequest, base: GoldenRun, accuracy: float) -> list[GoldenRun]:
     """A run by the bdf at the accuracy of checks beside an explicit method, whose meters are far better than those that
     a check may meet.
     """
@@ -143,7 +143,9 @@ def _others(request: Request, base: Run, accuracy: float) -> list[Run]:
         return []
 
 
-def _reference(request: Request, accuracy: float, rtol: float, atol: float, say: Say) -> tuple[Run, list[Run], Arrays]:
+def _reference(
+    request: RunRequest, accuracy: float, rtol: float, atol: float, say: Say
+) -> tuple[GoldenRun, list[GoldenRun], Arrays]:
     """(reference, the runs that measure it, its thinned trace)."""
     base = run(replace(request, accuracy=accuracy))
     if not base.trace.values:
@@ -174,14 +176,14 @@ def _reference(request: Request, accuracy: float, rtol: float, atol: float, say:
     return base, runs, golden
 
 
-def _taus(golden: Arrays, runs: Sequence[Run]) -> tuple[float, ...]:
+def _taus(golden: Arrays, runs: Sequence[GoldenRun]) -> tuple[float, ...]:
     """Time tolerances [s] to be tried, the widest last: where runs differ on a steep flank it is time that differs."""
     span = float(golden.time[-1] - golden.time[0])
     least = _tau(golden, [r.trace for r in runs])
     return tuple(dict.fromkeys(max(least, float(f"{share * span:.3g}")) for share in (SHARE, *STEEP)))
 
 
-def _own_error(golden: Arrays, runs: Sequence[Run], tolerance: Tolerance) -> float:
+def _own_error(golden: Arrays, runs: Sequence[GoldenRun], tolerance: Tolerance) -> float:
     """The error of the reference, relative as rtol is.  Raises Refused."""
     tenth = tolerance.part(1.0 / MARGIN)
     return max(_error(differences(golden, r.trace, tenth), tolerance.rtol, r.method) for r in runs)
@@ -193,9 +195,11 @@ def _error(verdict: Verdict, rtol: float, method: str) -> float:
     if worst is None:
         return 0.0
     unlike = [c for c in verdict.traces if not c.equal]
+    # missing quantities or other events: no error can be told
     if unlike or any(c.status not in ("equal", "differs") for c in verdict.quantities):
         raise Refused(f"two runs of the scene do not agree ({method}): {sentence(worst)}")
     error = max(c.worst.ratio for c in verdict.quantities) * rtol / MARGIN
+    # a tolerance of less than MARGIN times the reference's own error
     if MARGIN * error > rtol:
         message = f"the reference itself is off by {error:.1e} ({worst.name} at {worst.worst.time:.6g} s, {method})"
         help_ = f"--rtol {2 * MARGIN * error:.0e}" if error < 0.05 else "a shorter scene: it is chaotic or too stiff"
@@ -214,7 +218,7 @@ def _tau(golden: Arrays, others: Sequence[Arrays]) -> float:
     return float(f"{MARGIN * max((abs(a.time - b.time) for a, b in pairs), default=0.0):.3g}")
 
 
-def _thin(base: Run, rtol: float, atol: float) -> Arrays:
+def _thin(base: GoldenRun, rtol: float, atol: float) -> Arrays:
     """The reference on as few rows as tell it; quantities without a stored rate get one where they are smooth."""
     trace = base.trace
     names = list(trace.values)
@@ -250,7 +254,7 @@ def _untold(golden: Arrays, trace: Arrays, rtol: float, atol: float) -> Flags:
     return off
 
 
-def _every(request: Request, base: Run) -> list[Request]:
+def _every(request: RunRequest, base: GoldenRun) -> list[RunRequest]:
     """Every formulation by both methods; the reference's first."""
     others = (f for f in FORMULATIONS if f != base.formulation and request.formulation is None)
     method = "bdf" if base.method == "radau" else "radau"
@@ -262,8 +266,8 @@ def _every(request: Request, base: Run) -> list[Request]:
 
 
 def _formulations(
-    every: Sequence[Request], base: Run, golden: Arrays, tolerance: Tolerance, say: Say, jobs: int | None
-) -> tuple[float, dict[str, Any], list[Run]]:
+    every: Sequence[RunRequest], base: GoldenRun, golden: Arrays, tolerance: Tolerance, say: Say, jobs: int | None
+) -> tuple[float, dict[str, Any], list[GoldenRun]]:
     """(accuracy of checks, structure by formulation, the runs) of every formulation that can express the scene."""
     first = accuracy = max(tolerance.rtol * CHECKED, FINEST)
     structure: dict[str, Any] = {}
@@ -298,7 +302,7 @@ def _formulations(
     return accuracy, structure, found
 
 
-def _one(asked: tuple[Request, float, Floats]) -> Run | tuple[int, str, str]:
+def _one(asked: tuple[RunRequest, float, Floats]) -> GoldenRun | tuple[int, str, str]:
     """A run at an accuracy with rows between the kept instants [n] s; exit code, message and code where it stopped."""
     request, accuracy, time = asked
     try:
@@ -307,7 +311,7 @@ def _one(asked: tuple[Request, float, Floats]) -> Run | tuple[int, str, str]:
         return stopped.code, str(stopped), stopped.finding
 
 
-def _differences_from(one: Run, golden: Arrays, tolerance: Tolerance) -> Verdict:
+def _differences_from(one: GoldenRun, golden: Arrays, tolerance: Tolerance) -> Verdict:
     return differences(common(golden, set(one.trace.values)), one.trace, tolerance.part(HALF))
 
 

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from sysdyn.cli.failures import OF_CLAIMS, OF_RUNS
 from sysdyn.cli.run.request import targets
-from sysdyn.cli.run.request.asked import Request, options_of
+from sysdyn.cli.run.request.run_request import RunRequest, options_of
 from sysdyn.cli.run.running import Ran, integrate, ready
 from sysdyn.cli.run.start.starting import as_written
 from sysdyn.compiler.model import energies
@@ -33,7 +33,7 @@ def between(time: Floats) -> Floats:
 
 
 @dataclass(frozen=True, slots=True)
-class Run:
+class GoldenRun:
     """trace: its curves; structure: of this formulation; energy [J], constraints: largest of the meters;
     turnover [J]: the energy that went round; parameters: name to value in SI; claims: what it fails of them.
     """
@@ -58,7 +58,7 @@ class Stopped(Exception):  # noqa: N818 (no fault of the program)
 
 
 @ex.fresh()
-def run(request: Request, also: Floats | None = None) -> Run:
+def run(request: RunRequest, also: Floats | None = None) -> GoldenRun:
     """Simulate at the request's accuracy, or the scene's own where that is finer (its expectations want it).
 
     also [m] s: further instants of the trace.  Raises Stopped, UsageError, OSError, TraceError.
@@ -90,14 +90,14 @@ def run(request: Request, also: Floats | None = None) -> Run:
     turnover = ran.outcome.judgement.turnover if ran.outcome.judgement else 0.0
     claims = tuple(d.message for d in report.diagnostics if d.code == "E909")
     structure = _structure(ran, source)
-    return Run(source, structure, energy, constraints, turnover, formulation, method, parameters, claims)
+    return GoldenRun(source, structure, energy, constraints, turnover, formulation, method, parameters, claims)
 
 
 def _largest(values: Floats) -> float:
     return float(np.max(np.abs(values), initial=0.0))
 
 
-def _ran(request: Request, report: Report, also: Floats | None) -> Ran | None:
+def _ran(request: RunRequest, report: Report, also: Floats | None) -> Ran | None:
     """As `cli.running.run`, but the trace holds the steps and the instants that are wanted here."""
     target = targets.target_of(request, report)
     if target is None:
@@ -107,13 +107,16 @@ def _ran(request: Request, report: Report, also: Floats | None) -> Ran | None:
     options = None if prepared is None else options_of(own, target, prepared, report, time.monotonic(), None)
     if prepared is None or options is None:
         return None
+    # the finest of what is asked for, of the text's, of single quantities
     if request.accuracy is not None:
         finest = min([request.accuracy, options.accuracy or 1.0, *(a for _, a in options.accuracy_on)])
         options = replace(options, accuracy=finest, accuracy_on=())
     even = np.linspace(options.t_start, options.t_end, INSTANTS + 1)
     wanted = even if also is None else np.union1d(even, also)
+    # instants so near that they are one
     wanted = wanted[np.diff(wanted, prepend=-np.inf) > APART * (options.t_end - options.t_start)]
     inside = wanted[(wanted >= options.t_start) & (wanted <= options.t_end)]
+    # the steps themselves and these instants, in place of the scene's
     options = replace(options, output=None, every=None, at=tuple(inside.tolist()))
     return integrate(target, prepared, options, report)
 

@@ -60,12 +60,14 @@ class Checker:
         if not self._waiting:
             return None
         now = time.monotonic()
+        # one check at a time; it has PATIENCE if its own text is newer by now, LONGEST otherwise
         if self._busy is not None:
             left = self._busy[1] + (PATIENCE if self._busy[0] in self._waiting else LONGEST) - now
             if left > 0.0:
                 return left
             self.end()
         name, due = min(self._waiting.items(), key=lambda item: item[1])
+        # its text changed a moment ago: more of it may come
         if due > now:
             return due - now
         del self._waiting[name]
@@ -153,7 +155,7 @@ def found(name: str, unsaved: dict[str, str]) -> Checked:
 
 def accounts(name: str) -> Accounts:
     """What `sysdyn list` tells of each model of a file that has no errors."""
-    from sysdyn.cli.manual import names
+    from sysdyn.cli.manual import model_names
     from sysdyn.dsl import load
     from sysdyn.dsl.model import expression as ex
 
@@ -164,7 +166,7 @@ def accounts(name: str) -> Accounts:
             with ex.fresh():
                 listing = load.listing(document, model, None, Report())
                 if listing is not None:
-                    told[model.name.name] = names.account(document, model, listing)
+                    told[model.name.name] = model_names.account(document, model, listing)
     except Exception:  # the check has said why
         return {}
     return told

@@ -61,7 +61,7 @@ def complete(document: Document, offset: int) -> list[dict[str, Any]]:
     # coord x: |, param k: |
     if (match := _DECLARED.match(statement)) is not None:
         return _domains(document) if match[1] in _DOMAINS else _units()
-    inside = isinstance(sight.item_at(document, offset), (syntax.Model, syntax.Component))
+    inside = isinstance(sight.item_at(document, offset), (syntax.ModelDefinition, syntax.ComponentDefinition))
     words = expected_words(SourceText(source.name, source.text[:start]))
     # R1: |
     if inside and (match := _LABEL.match(statement)) is not None and match[1] not in words:

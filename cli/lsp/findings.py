@@ -50,6 +50,7 @@ def actions(document: Document, found: Sequence[Diagnostic], asked: Span, only: 
             spans = [d.edit.place.span, *([d.place.span] if d.place is not None else [])]
             if any(s.start <= asked.end and asked.start <= s.end for s in spans):
                 listed.append(_action(document, _title(d.edit), "quickfix", [d.edit], [diagnostic(d)]))
+    # the same fixes that `check --fix` makes
     if fixes and _is_wanted("source.fixAll", only):
         from sysdyn.cli.run.check.mending import disjoint_edits
 

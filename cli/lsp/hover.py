@@ -57,7 +57,7 @@ def _code(code: str) -> str:
     return f"**{code}**: {page.title}\n\n{page.why}\n\n`sysdyn explain {code}`"
 
 
-def _descriptions(document: Document, word: sight.Word) -> list[str]:
+def _descriptions(document: Document, word: sight.WordAtCursor) -> list[str]:
     """What is known of a word, one text for each of its declarations."""
     # a unit
     if document.marks.unit(word.start):
@@ -86,7 +86,7 @@ def _descriptions(document: Document, word: sight.Word) -> list[str]:
     return []
 
 
-def _describe(document: Document, word: sight.Word, d: Declared) -> str:
+def _describe(document: Document, word: sight.WordAtCursor, d: Declared) -> str:
     parts = [f"```sd\n{d.text}\n```", f"{d.kind}{_unit(document, word)}{_value(document, word)}"]
     if d.kind == "component":
         parts += _component(d)
@@ -101,7 +101,7 @@ def _component(d: Declared) -> list[str]:
     from sysdyn.cli.manual import library
 
     span = d.place.span
-    item = syntax.Component(syntax.Word(d.name, span), d.body, d.span)
+    item = syntax.ComponentDefinition(syntax.Word(d.name, span), d.body, d.span)
     lines = [f"- {p['kind']} `{p['name']}` {p['domain']}".replace(" ``", "").rstrip() for p in library.ports(item)]
     for p in library.parameters(item):
         default = f" = {p['default']}" if p["default"] else ""
@@ -113,11 +113,15 @@ def _component(d: Declared) -> list[str]:
 def _model(document: Document, offset: int) -> dict[str, Any] | None:
     """What `sysdyn list` knows of the model around a place."""
     item = sight.item_at(document, offset)
-    name = item.model.names[-1] if isinstance(item, syntax.Scene) else getattr(getattr(item, "name", None), "name", "")
+    name = (
+        item.model.names[-1]
+        if isinstance(item, syntax.SceneDefinition)
+        else getattr(getattr(item, "name", None), "name", "")
+    )
     return document.accounts.get(name)
 
 
-def _unit(document: Document, word: sight.Word) -> str:
+def _unit(document: Document, word: sight.WordAtCursor) -> str:
     """The unit of what can be read, where the model has no errors."""
     account = _model(document, word.start)
     path = ".".join((*word.path, word.name))
@@ -128,7 +132,7 @@ def _unit(document: Document, word: sight.Word) -> str:
     return ""
 
 
-def _value(document: Document, word: sight.Word) -> str:
+def _value(document: Document, word: sight.WordAtCursor) -> str:
     """The value of a parameter in its own unit."""
     account = _model(document, word.start)
     path = ".".join((*word.path, word.name))
@@ -146,6 +150,7 @@ def definition(document: Document, offset: int) -> list[dict[str, Any]]:
     if word is None:
         return []
     item = sight.item_at(document, offset)
+    # on the name of a module: the file
     if isinstance(item, syntax.Import) and item.module.span.start <= offset <= item.module.span.end:
         module = sight.module_of(document.source, item.module.names)
         return [] if module is None else [positions.location(Place(module.source, Span(0, 0)))]
@@ -195,7 +200,7 @@ def rename_edits(document: Document, offset: int, name: str) -> dict[str, Any]:
     if name in PREDEFINED:
         raise ValueError(f"'{name}' cannot be a name: the language has it already")
     # a name that is there already
-    other = sight.Word(word.path, name, declared[0].place.span.start, declared[0].place.span.start)
+    other = sight.WordAtCursor(word.path, name, declared[0].place.span.start, declared[0].place.span.start)
     if sight.find(document, other):
         raise ValueError(f"'{name}' is declared already")
     found = references(document, offset, True)

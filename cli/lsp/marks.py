@@ -36,16 +36,25 @@ def marks(tree: syntax.File) -> Marks:
     stack: list[object] = list(tree.items)
     while stack:
         node = stack.pop()
-        if isinstance(node, syntax.Unit):
+        if isinstance(node, syntax.UnitExpression):
             units.append(node.span)
             continue
         # what stands behind a colon is a domain there
-        if isinstance(node, (syntax.Node, syntax.Port, syntax.Branch, syntax.Coord, syntax.BundleMember)):
+        if isinstance(
+            node,
+            (
+                syntax.NodeStatement,
+                syntax.PortStatement,
+                syntax.BranchStatement,
+                syntax.CoordStatement,
+                syntax.BundleMember,
+            ),
+        ):
             domains.add(node.domain.span.start)
         # level names are looked up in the component
-        elif isinstance(node, syntax.SceneLevel):
+        elif isinstance(node, syntax.SceneLevelStatement):
             levels[node.level.span.start] = node.target
-        elif isinstance(node, syntax.Level):
+        elif isinstance(node, syntax.LevelStatement):
             levels |= {w.span.start: None for w in (node.name, node.extends) if w is not None}
         names.update(_names(node, tree.source.text))
         stack += children(node)
@@ -55,13 +64,16 @@ def marks(tree: syntax.File) -> Marks:
 def _names(node: object, text: str) -> Iterator[int]:
     """Offsets of the names of a node: where the cursor may ask for their meaning."""
     match node:
-        case syntax.Name() | syntax.Word() | syntax.Decl() | syntax.Call() | syntax.Parameter():
+        case syntax.Name() | syntax.Word() | syntax.Decl() | syntax.FunctionCall() | syntax.FormalParameter():
             yield node.span.start
+        # x.power: the last word
         case syntax.Member():
             yield node.span.end - len(node.name)
-        case syntax.Method():
+        # x.derivative(...): the word behind the dot
+        case syntax.MethodCall():
             found = _DOTS.search(text, node.base.span.end)
             yield node.span.start if found is None else found.start()
+        # std.thermal: each word
         case syntax.Dotted():
             yield from (m.start() for m in _DOTS.finditer(text, node.span.start, node.span.end))
         case syntax.Arg(name=str()):

@@ -58,33 +58,33 @@ class Declared:
 
 _BLOCKS = ("model", "component", "scene")
 _ITEMS: dict[type, str] = {
-    syntax.Model: "model",
-    syntax.Component: "component",
-    syntax.Scene: "scene",
-    syntax.Domain: "domain",
-    syntax.Bundle: "bundle",
+    syntax.ModelDefinition: "model",
+    syntax.ComponentDefinition: "component",
+    syntax.SceneDefinition: "scene",
+    syntax.DomainDefinition: "domain",
+    syntax.BundleDefinition: "bundle",
     syntax.UnitAlias: "unit",
     syntax.UnitBase: "unit",
-    syntax.Const: "const",
-    syntax.Function: "function",
-    syntax.Table: "table",
+    syntax.ConstDefinition: "const",
+    syntax.FunctionDefinition: "function",
+    syntax.TableDefinition: "table",
 }
 _SINGLE: dict[type, str] = {
-    syntax.Param: "parameter",
-    syntax.Input: "input",
-    syntax.Output: "output",
-    syntax.Quasi: "quasi-velocity",
-    syntax.State: "state",
-    syntax.Discrete: "discrete",
-    syntax.Let: "let",
-    syntax.Constraint: "constraint",
+    syntax.ParamStatement: "parameter",
+    syntax.InputStatement: "input",
+    syntax.OutputStatement: "output",
+    syntax.QuasiStatement: "quasi-velocity",
+    syntax.StateStatement: "state",
+    syntax.DiscreteStatement: "discrete",
+    syntax.LetStatement: "let",
+    syntax.ConstraintStatement: "constraint",
 }
 _SEVERAL: dict[type, str] = {
-    syntax.Node: "node",
-    syntax.Port: "port",
-    syntax.Branch: "branch",
-    syntax.Coord: "coordinate",
-    syntax.Implicit: "implicit",
+    syntax.NodeStatement: "node",
+    syntax.PortStatement: "port",
+    syntax.BranchStatement: "branch",
+    syntax.CoordStatement: "coordinate",
+    syntax.ImplicitStatement: "implicit",
 }
 
 
@@ -107,24 +107,24 @@ def body(source: SourceText, statements: Sequence[Any]) -> Iterator[Declared]:
             yield _declaration(source, s.decl.name, kind, s.decl.span, s, of="" if unit is None else unit.text)
         # node a, b: several
         elif (kind := _SEVERAL.get(type(s))) is not None:
-            of = s.unit.text if isinstance(s, syntax.Implicit) else s.domain.name
+            of = s.unit.text if isinstance(s, syntax.ImplicitStatement) else s.domain.name
             for decl in s.decls:
                 yield _declaration(source, decl.name, kind, decl.span, s, of=of)
         # an element or a component
-        elif isinstance(s, syntax.Instance):
+        elif isinstance(s, syntax.InstanceStatement):
             of = ".".join(s.component.names)
             kind = "element" if of in (*ONE_PORTS, *TWO_PORTS) else "instance"
             yield _declaration(source, s.decl.name, kind, s.decl.span, s, of=of)
-        elif isinstance(s, (syntax.Energy, syntax.Content)) and s.name is not None:
+        elif isinstance(s, (syntax.EnergyStatement, syntax.ContentStatement)) and s.name is not None:
             yield _declaration(
-                source, s.name.name, "energy" if isinstance(s, syntax.Energy) else "content", s.name.span, s
+                source, s.name.name, "energy" if isinstance(s, syntax.EnergyStatement) else "content", s.name.span, s
             )
         # a level and all that stands in it
-        elif isinstance(s, syntax.Level):
+        elif isinstance(s, syntax.LevelStatement):
             yield _declaration(source, s.name.name, "level", s.name.span, s, body=s.body)
             yield from body(source, s.body)
         # the loop variable and the loop's body
-        elif isinstance(s, syntax.For):
+        elif isinstance(s, syntax.ForStatement):
             yield _declaration(source, s.index.name, "index", s.index.span, s)
             yield from body(source, s.body)
 

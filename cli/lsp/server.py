@@ -101,6 +101,7 @@ class Server:
 
     def _answer(self, number: Any, method: str, params: dict[str, Any]) -> None:
         """The answer to one request; a fault in it is told, and the next one is answered."""
+        # out of turn: unknown, before `initialize`, after `shutdown`
         if method not in self._requests:
             self._refuse(number, wire.METHOD_NOT_FOUND, f"there is no method '{method[:100]}'")
         elif not self._initialized and method != "initialize":
@@ -110,6 +111,7 @@ class Server:
         else:
             try:
                 result = self._requests[method](params)
+            # what cannot be done now; parameters out of shape; a fault of our own
             except RefusedError as error:
                 self._refuse(number, wire.REQUEST_FAILED, str(error))
             except UNREADABLE as error:
@@ -181,8 +183,10 @@ class Server:
     def publish_check(self, name: str, text: str | None, result: Checked | Accounts) -> None:
         """Publish what the check of a text found, if it is open still and no newer one waits."""
         document = self._documents.find_by_name(name)
+        # the text changed, or was closed, while it was checked
         if document is None or document.source.text != text:
             return
+        # what hover says of elements, not findings
         if not isinstance(result, Checked):
             document.accounts = result
             return

@@ -28,7 +28,7 @@ _DEEPEST = 20
 
 
 @dataclass(frozen=True, slots=True)
-class Word:
+class WordAtCursor:
     """A name in a text with the names and dots before it."""
 
     path: tuple[str, ...]
@@ -42,7 +42,7 @@ def quiet(document: Document, offset: int) -> bool:
     return any(c.span.start < offset <= c.span.end for c in document.tree.comments)
 
 
-def word_at(document: Document, offset: int) -> Word | None:
+def word_at(document: Document, offset: int) -> WordAtCursor | None:
     """The word that a place touches; None in comments."""
     source = document.source
     if quiet(document, offset):
@@ -52,7 +52,7 @@ def word_at(document: Document, offset: int) -> Word | None:
     for match in _WORD.finditer(source.line(line)):
         if start + match.start() <= offset <= start + match.end():
             begin = start + match.start()
-            return Word(path_before(source, begin), match[0], begin, start + match.end())
+            return WordAtCursor(path_before(source, begin), match[0], begin, start + match.end())
     return None
 
 
@@ -73,18 +73,25 @@ def item_at(document: Document, offset: int) -> syntax.TopLevel | None:
 def local(document: Document, offset: int) -> Iterator[Declared]:
     """The names that the model, component or scene around a place has in sight."""
     item = item_at(document, offset)
-    if isinstance(item, syntax.Scene) and offset > item.model.span.end:
+    # in the body of a scene: the names of its model
+    if isinstance(item, syntax.SceneDefinition) and offset > item.model.span.end:
         name = item.model.names[-1]
-        item = next((i for i in document.tree.items if isinstance(i, syntax.Model) and i.name.name == name), None)
-    if isinstance(item, (syntax.Model, syntax.Component)) and not _of_head(item, offset):
+        item = next(
+            (i for i in document.tree.items if isinstance(i, syntax.ModelDefinition) and i.name.name == name), None
+        )
+    if isinstance(item, (syntax.ModelDefinition, syntax.ComponentDefinition)) and not _of_head(item, offset):
         yield from _declarations(document.source, item)
-    elif isinstance(item, (syntax.Function, syntax.Table)) and not _of_head(item, offset):
+    # in the body of a function or table: its arguments
+    elif isinstance(item, (syntax.FunctionDefinition, syntax.TableDefinition)) and not _of_head(item, offset):
         for p in item.params:
             place = document.source.place(p.span.start, p.span.start + len(p.name))
             yield Declared(p.name, "argument", place, p.span, "", p.unit.text)
 
 
-def _of_head(item: syntax.Model | syntax.Component | syntax.Function | syntax.Table, offset: int) -> bool:
+def _of_head(
+    item: syntax.ModelDefinition | syntax.ComponentDefinition | syntax.FunctionDefinition | syntax.TableDefinition,
+    offset: int,
+) -> bool:
     """Whether a place is at the item's own name."""
     return item.span.start <= offset <= item.name.span.end
 
@@ -129,11 +136,13 @@ def _items(tree: syntax.File) -> tuple[Declared, ...]:
 
 
 @lru_cache(64)
-def _declarations(source: SourceText, item: syntax.Model | syntax.Component) -> tuple[Declared, ...]:
+def _declarations(
+    source: SourceText, item: syntax.ModelDefinition | syntax.ComponentDefinition
+) -> tuple[Declared, ...]:
     return (*outline.body(source, item.body),)
 
 
-def find(document: Document, word: Word) -> list[Declared]:
+def find(document: Document, word: WordAtCursor) -> list[Declared]:
     """The declarations that a word may mean, the nearest first; of one name all in one scope (levels, statements)."""
     if document.marks.unit(word.start):
         return []
@@ -173,11 +182,11 @@ def _inside(document: Document, target: syntax.Expr) -> list[Declared]:
     return members(document, tuple(path), target.span.start)
 
 
-def _is_inside(word: Word, arg: syntax.Arg) -> bool:
+def _is_inside(word: WordAtCursor, arg: syntax.Arg) -> bool:
     return arg.span.start <= word.start < arg.span.end
 
 
-def inner_names(instance: syntax.Instance) -> Iterator[int]:
+def inner_names(instance: syntax.InstanceStatement) -> Iterator[int]:
     """Where an instance's arguments and connections name what is inside its component."""
     yield from (arg.span.start for arg in instance.args or () if arg.name is not None)
     for c in instance.connections:
@@ -185,25 +194,27 @@ def inner_names(instance: syntax.Instance) -> Iterator[int]:
             yield c.name.span.start
 
 
-def instance_at(document: Document, offset: int) -> syntax.Instance | None:
+def instance_at(document: Document, offset: int) -> syntax.InstanceStatement | None:
     """The element or component statement around a place."""
     item = item_at(document, offset)
-    stack = list(item.body) if isinstance(item, (syntax.Model, syntax.Component)) else []
+    stack = list(item.body) if isinstance(item, (syntax.ModelDefinition, syntax.ComponentDefinition)) else []
     while stack:
         s = stack.pop()
         if s.span.start <= offset <= s.span.end:
-            if isinstance(s, syntax.Instance):
+            if isinstance(s, syntax.InstanceStatement):
                 return s
-            stack += s.body if isinstance(s, (syntax.For, syntax.Level)) else ()
+            stack += s.body if isinstance(s, (syntax.ForStatement, syntax.LevelStatement)) else ()
     return None
 
 
 def members(document: Document, path: tuple[str, ...], offset: int) -> list[Declared]:
     """What is declared inside the component that a path of names leads to; nothing behind elements of the language."""
+    # std.thermal.
     if path[0] == "std":
         module = module_of(document.source, path)
         return [] if module is None else [*outline.items(module)]
     tree, among = document.tree, [*local(document, offset), *of_file(document.tree)]
+    # house.wall.: an instance, its component's body, and so on
     for name in path[:_DEEPEST]:
         owner = next((d for d in among if d.name == name), None)
         if owner is None:
@@ -246,12 +257,14 @@ def owner_of(document: Document, path: tuple[str, ...], offset: int) -> Declared
 
 def letters(document: Document, owner: Declared) -> tuple[str, ...]:
     """The members that the language itself gives to what has power: e, f, q, p, ..."""
+    # e1, f1, q1, p1, e2, ...
     if owner.of in TWO_PORTS:
         return tuple(f"{letter}{k}" for k in (1, 2) for letter in "efqp")
     if owner.kind in ("element", "branch") or owner.of in ONE_PORTS:
         return (*OWN, "power", "energy")
+    # a component of one branch stands for it: spring.e
     if owner.kind == "instance" and (component := component_of(document.tree, owner)) is not None:
-        single = any(isinstance(s, syntax.Branch) and not s.decls for s in component.body)
+        single = any(isinstance(s, syntax.BranchStatement) and not s.decls for s in component.body)
         return (*OWN, "power", "energy") if single else ()
     return {
         "node": OWN,

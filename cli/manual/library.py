@@ -19,14 +19,14 @@ PRELUDE = "prelude"
 
 
 @dataclass(frozen=True, slots=True)
-class Entry:
+class LibraryEntry:
     """A component, domain, bundle or constant of the library; module `prelude` needs no import."""
 
     name: str
     module: str
     kind: str
     doc: str
-    item: syntax.Component | syntax.Domain | syntax.Bundle | syntax.Const
+    item: syntax.ComponentDefinition | syntax.DomainDefinition | syntax.BundleDefinition | syntax.ConstDefinition
     source: SourceText
 
     @property
@@ -41,17 +41,25 @@ class Entry:
 
 
 @cache
-def entries() -> tuple[Entry, ...]:
+def entries() -> tuple[LibraryEntry, ...]:
     """Everything public, in the order of the modules' texts; the prelude comes last."""
-    kinds = {syntax.Component: "component", syntax.Domain: "domain", syntax.Bundle: "bundle", syntax.Const: "const"}
+    kinds = {
+        syntax.ComponentDefinition: "component",
+        syntax.DomainDefinition: "domain",
+        syntax.BundleDefinition: "bundle",
+        syntax.ConstDefinition: "const",
+    }
     found = []
     paths = sorted(LIBRARY.glob("*.sd"), key=lambda p: (p.stem == PRELUDE, p.stem))
     for path in paths:
         source = SourceText.read(path, f"std/{path.name}")
         for item in parse(source)[0].items:
-            if isinstance(item, (syntax.Component, syntax.Domain, syntax.Bundle, syntax.Const)):
+            if isinstance(
+                item,
+                (syntax.ComponentDefinition, syntax.DomainDefinition, syntax.BundleDefinition, syntax.ConstDefinition),
+            ):
                 doc = (item.doc or "").strip()
-                found.append(Entry(item.name.name, path.stem, kinds[type(item)], doc, item, source))
+                found.append(LibraryEntry(item.name.name, path.stem, kinds[type(item)], doc, item, source))
     return tuple(found)
 
 
@@ -78,22 +86,27 @@ def index(module: str | None = None) -> str:
     return "\n\n".join(parts)
 
 
-def find(name: str) -> Entry | None:
+def find(name: str) -> LibraryEntry | None:
     """The entry of `resistor`, `electrical.resistor` or `std.electrical.resistor`."""
     *around, last = name.removeprefix("std.").split(".")
     return next((e for e in entries() if e.name == last and around in ([], [e.module])), None)
 
 
-def page(entry: Entry) -> str:
+def page(entry: LibraryEntry) -> str:
     """What a user of the library needs of one entry: ports, parameters, text, an example."""
-    if not isinstance(entry.item, syntax.Component):
+    # a domain, a bundle, a constant: its text is all
+    if not isinstance(entry.item, syntax.ComponentDefinition):
         return f"{entry.name}: {entry.line}\nIn every file, without an import.\n\n{_indent(entry.text)}"
     body = tuple(_statements(entry.item.body))
     parts = [f"{entry.name}: {entry.doc}\n\n    from std.{entry.module} import {entry.name}", picture(entry)]
     rows = [(f"  {p['name']}", p["unit"], p["default"] or "required", p["doc"]) for p in parameters(entry.item)]
     if rows:
         parts.append("Parameters and inputs\n" + align([("  name", "unit", "default", ""), *rows]))
-    levels = [(f"  {s.name.name}{'*' if s.default else ''}", s.doc or "") for s in body if isinstance(s, syntax.Level)]
+    levels = [
+        (f"  {s.name.name}{'*' if s.default else ''}", s.doc or "")
+        for s in body
+        if isinstance(s, syntax.LevelStatement)
+    ]
     if levels:
         other = levels[-1][0].strip(" *")
         parts.append(f"Levels (* is taken where none is named, as in {entry.name}.{other}(...))\n{align(levels)}")
@@ -103,55 +116,63 @@ def page(entry: Entry) -> str:
     return "\n\n".join(parts)
 
 
-def account(entry: Entry) -> dict[str, Any]:
+def account(entry: LibraryEntry) -> dict[str, Any]:
     """The JSON object of `sysdyn std NAME`."""
     found: dict[str, Any] = {"name": entry.name, "module": entry.module, "kind": entry.kind, "doc": entry.doc}
     found["text"] = entry.text
-    if isinstance(entry.item, syntax.Component):
+    if isinstance(entry.item, syntax.ComponentDefinition):
         found |= {"ports": ports(entry.item), "parameters": parameters(entry.item), "example": example(entry)}
         found["laws"] = [_statement_text(entry, s) for s in _statements(entry.item.body) if isinstance(s, _LAWS)]
-        found["levels"] = [s.name.name for s in entry.item.body if isinstance(s, syntax.Level)]
+        found["levels"] = [s.name.name for s in entry.item.body if isinstance(s, syntax.LevelStatement)]
     return found
 
 
-_LAWS = (syntax.Law, syntax.Energy, syntax.Content, syntax.Work, syntax.Constraint, syntax.Dynamic, syntax.Instance)
+_LAWS = (
+    syntax.LawStatement,
+    syntax.EnergyStatement,
+    syntax.ContentStatement,
+    syntax.WorkStatement,
+    syntax.ConstraintStatement,
+    syntax.DynamicStatement,
+    syntax.InstanceStatement,
+)
 
 
 def _statements(body: Sequence[syntax.Statement]) -> Iterator[syntax.Statement]:
     """Statements, those of levels too."""
     for statement in body:
         yield statement
-        if isinstance(statement, syntax.Level):
+        if isinstance(statement, syntax.LevelStatement):
             yield from _statements(statement.body)
 
 
-def _statement_text(entry: Entry, statement: syntax.Statement) -> str:
+def _statement_text(entry: LibraryEntry, statement: syntax.Statement) -> str:
     return " ".join(entry.source.text[statement.span.start : statement.span.end].split())
 
 
-def ports(component: syntax.Component) -> list[dict[str, str]]:
+def ports(component: syntax.ComponentDefinition) -> list[dict[str, str]]:
     """Ports and branches with their domains, outputs too."""
     found = []
     for s in _statements(component.body):
-        if isinstance(s, syntax.Port):
+        if isinstance(s, syntax.PortStatement):
             found += [{"name": d.name, "kind": "port", "domain": s.domain.name} for d in s.decls]
-        elif isinstance(s, syntax.Branch):
+        elif isinstance(s, syntax.BranchStatement):
             found += [{"name": d.name, "kind": "branch", "domain": s.domain.name} for d in s.decls]
             found += [] if s.decls else [{"name": "", "kind": "branch", "domain": s.domain.name}]
-        elif isinstance(s, syntax.Output):
+        elif isinstance(s, syntax.OutputStatement):
             found.append({"name": s.decl.name, "kind": "output", "domain": ""})
     return [dict(pairs) for pairs in dict.fromkeys(tuple(p.items()) for p in found)]
 
 
-def parameters(component: syntax.Component) -> list[dict[str, str]]:
+def parameters(component: syntax.ComponentDefinition) -> list[dict[str, str]]:
     """Parameters and inputs: name, unit, default ('' where one must be given), comment."""
     found: dict[str, dict[str, str]] = {}
     for s in _statements(component.body):
-        if isinstance(s, (syntax.Param, syntax.Input)):
+        if isinstance(s, (syntax.ParamStatement, syntax.InputStatement)):
             unit = "" if s.unit is None else s.unit.text
             default = "" if s.value is None else format_expression(s.value)
             doc = (s.doc or "").strip()
-            kind = "input" if isinstance(s, syntax.Input) else "param"
+            kind = "input" if isinstance(s, syntax.InputStatement) else "param"
             found.setdefault(
                 s.decl.name, {"name": s.decl.name, "kind": kind, "unit": unit, "default": default, "doc": doc}
             )
@@ -160,9 +181,9 @@ def parameters(component: syntax.Component) -> list[dict[str, str]]:
     return list(found.values())
 
 
-def picture(entry: Entry) -> str:
+def picture(entry: LibraryEntry) -> str:
     """The component as a box: ends on the left, ends and outputs on the right, domains in words."""
-    assert isinstance(entry.item, syntax.Component)
+    assert isinstance(entry.item, syntax.ComponentDefinition)
     found = ports(entry.item)
     branches = [p for p in found if p["kind"] == "branch"]
     inputs = [p["name"] for p in parameters(entry.item) if p["kind"] == "input"]
@@ -190,9 +211,9 @@ def picture(entry: Entry) -> str:
     return "\n".join([bar, *rows, bar, "", f"    {how}"])
 
 
-def _use(entry: Entry, branches: list[dict[str, str]], nodes: list[str], inputs: list[str]) -> str:
+def _use(entry: LibraryEntry, branches: list[dict[str, str]], nodes: list[str], inputs: list[str]) -> str:
     """How it is written: `label: resistor(R = ...) a -> b`."""
-    assert isinstance(entry.item, syntax.Component)
+    assert isinstance(entry.item, syntax.ComponentDefinition)
     given = [p["name"] for p in parameters(entry.item) if p["kind"] == "param" and not p["default"]]
     arguments = ", ".join(f"{name} = ..." for name in given)
     binds = [f"{n.split()[0]} = ..." for n in nodes]
@@ -204,23 +225,25 @@ def _use(entry: Entry, branches: list[dict[str, str]], nodes: list[str], inputs:
 
 
 @cache
-def _examples(module: str) -> tuple[SourceText, dict[str, syntax.Model | syntax.Scene]]:
+def _examples(module: str) -> tuple[SourceText, dict[str, syntax.ModelDefinition | syntax.SceneDefinition]]:
     source = SourceText.read(LIBRARY / "examples" / f"{module}.sd", f"std/examples/{module}.sd")
     items = parse(source)[0].items
-    return source, {i.name.name: i for i in items if isinstance(i, (syntax.Model, syntax.Scene))}
+    return source, {i.name.name: i for i in items if isinstance(i, (syntax.ModelDefinition, syntax.SceneDefinition))}
 
 
-def example(entry: Entry) -> str | None:
+def example(entry: LibraryEntry) -> str | None:
     """A whole text that uses a component, with the imports that it needs."""
     if entry.kind != "component":
         return None
     source, items = _examples(entry.module)
+    # `Wall_example`, a model, and `Wall_run`, its scene
     chosen = [items[name] for name in (f"{entry.name}_example", f"{entry.name}_run") if name in items]
     if not chosen:
         return None
     model = chosen[0]
-    assert isinstance(model, syntax.Model)
-    used = {s.component.names[0] for s in model.body if isinstance(s, syntax.Instance)}
+    assert isinstance(model, syntax.ModelDefinition)
+    # the imports that the example's instances need
+    used = {s.component.names[0] for s in model.body if isinstance(s, syntax.InstanceStatement)}
     wanted: dict[str, list[str]] = {}
     for e in entries():
         if e.kind == "component" and e.name in used:

@@ -97,10 +97,11 @@ def _library() -> str:
     return "\n".join(parts)
 
 
-def _entry(entry: library.Entry) -> str:
+def _entry(entry: library.LibraryEntry) -> str:
     """HTML of a library's entry: picture, parameters, text and example."""
     parts = [f'<h4 id="{_anchor(entry)}"><code>{escape(entry.name)}</code></h4><p>{escape(entry.doc)}</p>']
-    if isinstance(entry.item, syntax.Component):
+    # domains, bundles and constants have a text alone
+    if isinstance(entry.item, syntax.ComponentDefinition):
         parts.append(f"<pre>{escape(library.picture(entry))}</pre>")
         rows = [[p["name"], p["unit"], p["default"] or "required", p["doc"]] for p in library.parameters(entry.item)]
         if rows:
@@ -112,7 +113,7 @@ def _entry(entry: library.Entry) -> str:
     return "\n".join(parts)
 
 
-def _anchor(entry: library.Entry) -> str:
+def _anchor(entry: library.LibraryEntry) -> str:
     return f"std-{entry.module}-{entry.name}"
 
 

@@ -112,12 +112,14 @@ def page(topic: Topic) -> str:
     table: list[list[str]] = []
     fenced = False
     for line in [*topic.text.splitlines(), ""]:
+        # rows are kept until the table ends: its columns are as wide as the widest
         if line.startswith("|") and not fenced:
             table.append([_plain(cell) for cell in line.strip().strip("|").split(" | ")])
             continue
         if table:
             lines += [f"  {row}" for row in _rows(table).splitlines()]
             table = []
+        # a fence opens or closes; ```sd wall.sd is a file, ```sd E805 a wrong text
         if line.startswith("```"):
             fenced = not fenced
             said = line.removeprefix("```sd").removeprefix("```sh").strip()

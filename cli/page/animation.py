@@ -15,7 +15,7 @@ import numpy as np
 from sysdyn.cli.failures import UsageError
 from sysdyn.cli.page.curves import BOTTOM, HEIGHT, LEFT, RIGHT, TOP, WIDTH, axes, frame_around, ticks
 from sysdyn.cli.page.document import document
-from sysdyn.cli.page.named import no_quantity
+from sysdyn.cli.page.figure_sources import no_quantity
 from sysdyn.cli.page.panels import COLOURS, Floats, Panel, abbreviate, curve, panels_of, time_unit, unit_text
 from sysdyn.cli.page.unit_text import conversion
 from sysdyn.names import trace_name
@@ -171,6 +171,7 @@ def _place(it: Film, point: tuple[str, str], unit: str) -> tuple[Floats, Floats]
     """Both coordinates of a point in a unit, frame by frame; UsageError where one is of another dimension."""
     found = []
     for text in point:
+        # a number in place of a quantity: a fixed point
         if text not in it.trace.names:
             found.append(np.full_like(it.instants, float(text)))
             continue

@@ -53,7 +53,7 @@ def outline(source: Source, name: str, low: float, high: float, scale: float = 1
 
 
 @dataclass(frozen=True, slots=True)
-class Frame:
+class PlotFrame:
     """Where values stand in a picture."""
 
     low: float
@@ -74,17 +74,17 @@ class Frame:
         return [f"{u:.1f},{v:.1f}" for u, v in zip(self.across(x), self.y_pixels(y), strict=True)]
 
 
-def frame_around(low: float, high: float, values: Sequence[Floats]) -> Frame | None:
+def frame_around(low: float, high: float, values: Sequence[Floats]) -> PlotFrame | None:
     """The frame around some values; None where there is nothing to draw."""
     if not values or not high > low:
         return None
     bottom, top = min(float(y.min()) for y in values), max(float(y.max()) for y in values)
     margin = 0.05 * (top - bottom) or 0.05 * abs(top) or 1.0
-    frame = Frame(low, high, bottom - margin, top + margin)
+    frame = PlotFrame(low, high, bottom - margin, top + margin)
     return frame if math.isfinite(frame.top - frame.bottom) and frame.top > frame.bottom else None
 
 
-def axes(frame: Frame, time_unit: str, unit: str) -> list[str]:
+def axes(frame: PlotFrame, time_unit: str, unit: str) -> list[str]:
     """Grid, ticks and units."""
     parts = []
     for value, label in ticks(frame.low, frame.high, 6):

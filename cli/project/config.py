@@ -153,9 +153,11 @@ def _read(path: Path, table: str, key: str, value: Any) -> tuple[str, Any]:
 def _files(project: Path, said: str, where: str) -> Iterator[str]:
     """What an item of `files` names, inside the project's folder, links followed; UsageError where it is outside."""
     found = [project / said] if "\0" not in said else []
+    # a pattern, unless a file has that very name
     if any(sign in said for sign in "*?[") and found and not found[0].exists():
         found = [Path(name) for name in sorted(glob.glob(str(found[0]), recursive=True))]  # noqa: PTH207
         found = found or [project / said]  # nothing fits: the command says so
+    # a folder: links in it must not lead out of the project
     elif found and found[0].is_dir():
         links = (p for p in sorted(found[0].rglob("*.sd")) if p.is_symlink())
         found += [p for p in links if not inside(p, project)]

@@ -39,7 +39,7 @@ NEAR = 1e-5
 
 
 @dataclass(frozen=True, slots=True)
-class Finding:
+class HealthFinding:
     """One thing looked at; state is ok, warning (a part of the product is slower or missing) or error."""
 
     name: str
@@ -48,9 +48,9 @@ class Finding:
     help: str | None = None
 
 
-def examine() -> Iterator[Finding]:
+def examine() -> Iterator[HealthFinding]:
     """Look at everything; what raises is a finding too."""
-    looks: tuple[tuple[str, Callable[[], Iterator[Finding]]], ...] = (
+    looks: tuple[tuple[str, Callable[[], Iterator[HealthFinding]]], ...] = (
         ("versions", _versions),
         ("core", _core),
         ("compiler", _compiler),
@@ -62,38 +62,40 @@ def examine() -> Iterator[Finding]:
         try:
             yield from look()
         except Exception as error:  # whatever this machine does: it is what was asked
-            yield Finding(name, "error", f"{type(error).__name__}: {error}")
+            yield HealthFinding(name, "error", f"{type(error).__name__}: {error}")
 
 
-def _versions() -> Iterator[Finding]:
+def _versions() -> Iterator[HealthFinding]:
     """Versions of sysdyn, Python and packages; another project's files in the same place."""
-    yield Finding("sysdyn", "ok", f"{sysdyn.__version__}, {Path(__file__).parents[2]}")
+    yield HealthFinding("sysdyn", "ok", f"{sysdyn.__version__}, {Path(__file__).parents[2]}")
     others = list(importlib.metadata.distributions(name=distribution.TAKEN))
     if others:
         other = f"{distribution.TAKEN} {others[0].version}, {others[0].locate_file('')}"
-        yield Finding("sysdyn", "error", "another project's files are in the same folder", distribution.advise(other))
-    yield Finding("python", "ok", f"{platform.python_version()}, {sys.executable}; {platform.platform()}")
+        yield HealthFinding(
+            "sysdyn", "error", "another project's files are in the same folder", distribution.advise(other)
+        )
+    yield HealthFinding("python", "ok", f"{platform.python_version()}, {sys.executable}; {platform.platform()}")
     found, missing = [], []
     for name in NEEDED:
         try:
             found.append(f"{name} {importlib.metadata.version(name)}")
         except importlib.metadata.PackageNotFoundError:
             missing.append(name)
-    yield Finding("packages", "ok", ", ".join(found))
+    yield HealthFinding("packages", "ok", ", ".join(found))
     if missing:
-        yield Finding("packages", "error", f"not there: {', '.join(missing)}", f"pip install {' '.join(missing)}")
+        yield HealthFinding("packages", "error", f"not there: {', '.join(missing)}", f"pip install {' '.join(missing)}")
 
 
-def _core() -> Iterator[Finding]:
+def _core() -> Iterator[HealthFinding]:
     try:
         from sysdyn.runtime import _core as core
     except ImportError as error:
-        yield Finding("core", "error", str(error), f"install {distribution.NAME} again: the core is built then")
+        yield HealthFinding("core", "error", str(error), f"install {distribution.NAME} again: the core is built then")
         return
-    yield Finding("core", "ok", str(core.__file__))
+    yield HealthFinding("core", "ok", str(core.__file__))
 
 
-def _compiler() -> Iterator[Finding]:
+def _compiler() -> Iterator[HealthFinding]:
     """Whether a C compiler is there and makes a library, and how long it takes."""
     from sysdyn.compiler.program import build
 
@@ -104,13 +106,14 @@ def _compiler() -> Iterator[Finding]:
         built = build.build(f"/* {os.getpid()} {time.time_ns()} */\nint sd_doctor(void) {{ return 1; }}\n")
         built.unlink(missing_ok=True)
         said = f"{' '.join((*command, *options))}, a library in {time.monotonic() - began:.2f} s"
-        yield Finding("compiler", "ok", said)
+        yield HealthFinding("compiler", "ok", said)
     except build.BuildError as error:
         first = error.output.strip().splitlines()[:1]
-        yield Finding("compiler", "warning", ": ".join([str(error), *first]), help_)
+        yield HealthFinding("compiler", "warning", ": ".join([str(error), *first]), help_)
 
 
-def _cache() -> Iterator[Finding]:
+def _cache() -> Iterator[HealthFinding]:
+    """Where compiled models are kept, how many and how large; a warning where it is not the folder asked for."""
     from sysdyn.compiler.program import cache
 
     folder, wanted = cache.folder(), cache.requested_folder()
@@ -118,11 +121,13 @@ def _cache() -> Iterator[Finding]:
     said = f"{folder}: {len(entries)} models, {sum(entries) / 1e6:.1f} of {cache.limit() / 1e6:.0f} MB"
     if folder != wanted:
         help_ = "a folder that is yours alone and writable: SYSDYN_CACHE=..."
-        yield Finding("cache", "warning", f"{wanted} cannot be used; models are compiled anew in each process", help_)
-    yield Finding("cache", "ok", said)
+        yield HealthFinding(
+            "cache", "warning", f"{wanted} cannot be used; models are compiled anew in each process", help_
+        )
+    yield HealthFinding("cache", "ok", said)
 
 
-def _hdf5() -> Iterator[Finding]:
+def _hdf5() -> Iterator[HealthFinding]:
     """Whether trace files can be written and read, and the room for them."""
     import shutil
 
@@ -135,20 +140,20 @@ def _hdf5() -> Iterator[Finding]:
         with h5py.File(path) as file:
             assert list(file["x"]) == [1.0, 2.0]
         free = shutil.disk_usage(place).free
-    yield Finding("trace files", "ok", f"HDF5 {h5py.version.hdf5_version}, h5py {h5py.__version__}")
+    yield HealthFinding("trace files", "ok", f"HDF5 {h5py.version.hdf5_version}, h5py {h5py.__version__}")
     if free < ROOM:
-        yield Finding("disk", "warning", f"{free / 1e6:.0f} MB are free in {tempfile.gettempdir()}", "TMPDIR=...")
+        yield HealthFinding("disk", "warning", f"{free / 1e6:.0f} MB are free in {tempfile.gettempdir()}", "TMPDIR=...")
 
 
-def _runs() -> Iterator[Finding]:
+def _runs() -> Iterator[HealthFinding]:
     """A swing by both backends against its cosine."""
     for backend in BACKENDS:
         yield _run(backend)
 
 
-def _run(backend: str) -> Finding:
+def _run(backend: str) -> HealthFinding:
     """A swing of three seconds by one backend against its closed form."""
-    from sysdyn.cli.run.request.asked import Request
+    from sysdyn.cli.run.request.run_request import RunRequest
     from sysdyn.cli.run.running import run
     from sysdyn.dsl.text.diagnostics import Report
 
@@ -156,17 +161,17 @@ def _run(backend: str) -> Finding:
     with tempfile.TemporaryDirectory() as place:
         model = Path(place) / "swing.sd"
         model.write_text(SWING, encoding="utf-8")
-        ran = run(Request(str(model), backend=backend, output=str(Path(place) / "swing.h5")), report)
+        ran = run(RunRequest(str(model), backend=backend, output=str(Path(place) / "swing.h5")), report)
         end = math.nan if ran is None else float(ran.outcome.traced["x"].values[-1])
     took = time.monotonic() - began
     name = f"run ({backend})"
     # it does not run here
     if ran is None or report.failed:
-        return Finding(name, "error", "; ".join(f"{d.code}: {d.message}" for d in report) or "it did not run")
+        return HealthFinding(name, "error", "; ".join(f"{d.code}: {d.message}" for d in report) or "it did not run")
     error = abs(end - math.cos(2.0 * 3.0))
     said = f"a swing of 3 s in {took:.2f} s, off by {error:.1e} of its amplitude"
     notes = [d.message for d in report if d.code == "N609"]
     # it runs, and is wrong
     if not error <= NEAR:
-        return Finding(name, "error", said, "this machine computes something else than others: please report it")
-    return Finding(name, "warning", "; ".join([said, *notes])) if notes else Finding(name, "ok", said)
+        return HealthFinding(name, "error", said, "this machine computes something else than others: please report it")
+    return HealthFinding(name, "warning", "; ".join([said, *notes])) if notes else HealthFinding(name, "ok", said)

@@ -14,9 +14,9 @@ from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
-from sysdyn.cli.report.balance import Part, add_observations, shares
+from sysdyn.cli.report.balance import BalancePart, add_observations, shares
 from sysdyn.cli.run.prepare import prepare
-from sysdyn.cli.run.request.asked import Request, of_these_alone, options_of
+from sysdyn.cli.run.request.run_request import RunRequest, of_these_alone, options_of
 from sysdyn.cli.run.request.targets import Target
 from sysdyn.cli.run.running import Ran, integrate, ready
 from sysdyn.dsl.model import expression as ex
@@ -57,7 +57,7 @@ class Activities:
 
 
 def activities(
-    request: Request,
+    request: RunRequest,
     target: Target,
     report: Report,
     folder: Path,
@@ -104,7 +104,7 @@ def activities(
     return _rank_activities(ran.outcome.traced, parts, ran)
 
 
-def _rank_activities(trace: Trace, parts: Sequence[Part], ran: Ran) -> Activities:
+def _rank_activities(trace: Trace, parts: Sequence[BalancePart], ran: Ran) -> Activities:
     """Activities of all parts with their shares, the largest first."""
     found = [(part, variation(trace.time, trace[part.name])) for part in parts]
     total = float(sum(value for part, value in found if part.role != "through"))

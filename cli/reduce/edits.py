@@ -57,8 +57,8 @@ def candidates(target: Target, network: Network, found: Sequence[Activity]) -> t
         # sources drive the model
         if all(a.role in ("in", "through") for a in group):
             continue
-        name = statement.decl.name if isinstance(statement, syntax.Instance) else ""
-        several = sum(isinstance(s, syntax.Instance) and s.decl.name == name for s in target.model.body) > 1
+        name = statement.decl.name if isinstance(statement, syntax.InstanceStatement) else ""
+        several = sum(isinstance(s, syntax.InstanceStatement) and s.decl.name == name for s in target.model.body) > 1
         value, share = sum(a.activity for a in group), sum(a.share for a in group)
         label = group[0].label if several else name or group[0].label
         made.append(
@@ -72,7 +72,7 @@ def _statement(target: Target, activity: Activity) -> syntax.Statement | None:
     if activity.name:
         first = re.split(r"[.\[#]", activity.name, maxsplit=1)[0]
         text, own = target.document.file.source.text, "".join(activity.name.split())
-        named = [s for s in target.model.body if isinstance(s, syntax.Instance) and s.decl.name == first]
+        named = [s for s in target.model.body if isinstance(s, syntax.InstanceStatement) and s.decl.name == first]
         said = {"".join(text[s.decl.span.start : s.decl.span.end].split()): s for s in named}
         several = next(
             (s for label, s in said.items() if own == label or own.startswith((f"{label}.", f"{label}#"))), None
@@ -86,7 +86,7 @@ def _statement(target: Target, activity: Activity) -> syntax.Statement | None:
 
 def _zero_source(source: SourceText, statement: syntax.Statement, network: Network) -> str:
     """`label: effort(e = 0 V) a -> b`, or of zero flow where nodes have a common flow."""
-    if not isinstance(statement, syntax.Instance) or statement.decl.indices or len(statement.connections) != 1:
+    if not isinstance(statement, syntax.InstanceStatement) or statement.decl.indices or len(statement.connections) != 1:
         return ""
     connection = statement.connections[0]
     branch = next((b for b in network.branches if b.name.partition(".")[0] == statement.decl.name), None)
@@ -123,11 +123,12 @@ def merge_nodes(target: Target, text: str, candidate: Candidate) -> str | None:
     speaks is not renamed.
     """
     statement = next((s for s in target.model.body if (s.span.start, s.span.end) == candidate.span), None)
-    if not isinstance(statement, syntax.Instance) or not candidate.joined:
+    if not isinstance(statement, syntax.InstanceStatement) or not candidate.joined:
         return None
     ends = _ends(text, statement.connections[0])
     if len(ends) != 2 or not all(re.fullmatch(r"\w+", end) for end in ends):
         return None
+    # the second end goes, or the first where the model speaks of the second elsewhere
     for stays, goes in (ends, ends[::-1]):
         node = _node_statement(target, goes)
         if node is not None and stays != goes and _spoken(target, text, goes) == 0:
@@ -146,21 +147,21 @@ def _ends(text: str, connection: syntax.Connection) -> list[str]:
     )
 
 
-def _node_statement(target: Target, name: str) -> syntax.Node | None:
+def _node_statement(target: Target, name: str) -> syntax.NodeStatement | None:
     """The scalar node of that name that the model declares."""
-    nodes = (s for s in target.model.body if isinstance(s, syntax.Node))
+    nodes = (s for s in target.model.body if isinstance(s, syntax.NodeStatement))
     return next((s for s in nodes if any(d.name == name and not d.indices for d in s.decls)), None)
 
 
-def _connections(target: Target) -> Iterator[tuple[syntax.Instance, syntax.Connection]]:
+def _connections(target: Target) -> Iterator[tuple[syntax.InstanceStatement, syntax.Connection]]:
     for s in target.model.body:
-        if isinstance(s, syntax.Instance):
+        if isinstance(s, syntax.InstanceStatement):
             yield from ((s, connection) for connection in s.connections)
 
 
 def _spoken(target: Target, text: str, name: str) -> int:
     """How often the model and its scenes speak of a node, declarations and ends of elements apart."""
-    scenes = [item.span for item in target.document.file.items if isinstance(item, syntax.Scene)]
+    scenes = [item.span for item in target.document.file.items if isinstance(item, syntax.SceneDefinition)]
     whole = sum(_read(text[span.start : span.end], name, of=True) for span in (target.model.span, *scenes))
     ends = sum(_read(text[c.span.start : c.span.end], name, of=True) for _, c in _connections(target))
     return whole - ends - 1
@@ -181,7 +182,7 @@ def _rename_cuts(target: Target, text: str, goes: str, stays: str) -> Iterator[C
                 yield connection.span.start, connection.span.end, new
 
 
-def _declaration_cuts(text: str, node: syntax.Node, name: str) -> Iterator[Cut]:
+def _declaration_cuts(text: str, node: syntax.NodeStatement, name: str) -> Iterator[Cut]:
     """Cuts that take a name out of a declaration."""
     if len(node.decls) == 1:
         yield node.span.start, node.span.end, ""
@@ -196,7 +197,7 @@ def _initials(target: Target, name: str) -> Iterator[tuple[int, int]]:
     if not name:
         return
     for s in (*target.model.body, *(target.scene.body if target.scene else ())):
-        if isinstance(s, syntax.Init):
+        if isinstance(s, syntax.InitStatement):
             words = re.split(r"[.'\[\s]", source.text[s.target.span.start : s.target.span.end], maxsplit=1)
             if words[0] == name:
                 yield s.span.start, s.span.end
@@ -220,7 +221,7 @@ def unread(target: Target, text: str, before: str) -> str:
     """The text without scalar parameters of the model that nothing reads any more, but something read before."""
     cuts = []
     for s in target.model.body:
-        if isinstance(s, syntax.Param):
+        if isinstance(s, syntax.ParamStatement):
             name = s.decl.name
             if _read(before, name) > 1 and _read(text, name) == 1:
                 cuts.append((s.span.start, s.span.end, ""))

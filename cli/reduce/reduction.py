@@ -3,7 +3,7 @@
 The full model's run at a tenth of the accuracy is the reference.  The least active element is left out, or its ends
 become one; what the traced quantities differ by is measured, and the change is kept where it stays within the accuracy
 (all changes together).  After MISSES elements in a row that are needed the rest, which takes part more, is left alone.
-Received: a request; handed back: `Reduced`.
+Received: a request; handed back: `ReducedModel`.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ from sysdyn.cli.failures import UsageError
 from sysdyn.cli.reduce import edits
 from sysdyn.cli.reduce.activity import Activities, activities
 from sysdyn.cli.run.request import targets
-from sysdyn.cli.run.request.asked import ACCURACY, Request, check_tolerances, options_of
+from sysdyn.cli.run.request.run_request import ACCURACY, RunRequest, check_tolerances, options_of
 from sysdyn.cli.run.request.targets import Target
 from sysdyn.cli.run.running import Ran, integrate, ready
 from sysdyn.cli.trade.errors import error_of
@@ -67,7 +67,7 @@ class Cost:
 
 
 @dataclass(frozen=True, slots=True)
-class Reduced:
+class ReducedModel:
     """What came of it.  text: of the reduced model, the author's own where nothing was kept; error: of it, relative;
     full, reduced: cost of both.
     """
@@ -84,14 +84,14 @@ class Reduced:
 
 
 def reduce(
-    request: Request,
+    request: RunRequest,
     report: Report,
     folder: Path,
     *,
     only: bool = False,
     budget: float | None = None,
     progress: Callable[[float, float | None], None] | None = None,
-) -> Reduced | None:
+) -> ReducedModel | None:
     """Measure activities and (unless only they are asked) reduce; None where the report says why not."""
     check_tolerances(request)
     if request.rtol is not None or request.atol is not None:
@@ -107,7 +107,7 @@ def reduce(
     text = target.document.file.source.text
     # no trials
     if only:
-        return Reduced(target.name, request.accuracy or ACCURACY, found, (), text, 0.0, None, None, True)
+        return ReducedModel(target.name, request.accuracy or ACCURACY, found, (), text, 0.0, None, None, True)
     limit = None if budget is None else began + budget
     return _Reduction(request, target, found, folder, limit, progress).all(report)
 
@@ -117,7 +117,7 @@ class _Reduction:
 
     def __init__(
         self,
-        request: Request,
+        request: RunRequest,
         target: Target,
         found: Activities,
         folder: Path,
@@ -131,7 +131,7 @@ class _Reduction:
         self.judged: tuple[str, ...] = ()
         self.reference: Trace | None = None
 
-    def all(self, report: Report) -> Reduced | None:
+    def all(self, report: Report) -> ReducedModel | None:
         """The reference, then every candidate."""
         text = self.target.document.file.source.text
         ran = self._run(self.target, "reference", FINER, report)
@@ -146,7 +146,9 @@ class _Reduction:
             cost = self._cost(final) if final is not None else None
             reduced = format_text(final.document.file) if final is not None else reduced
         found = self.found
-        return Reduced(self.target.name, self.accuracy, found, tuple(self.trials), reduced, error, full, cost, ended)
+        return ReducedModel(
+            self.target.name, self.accuracy, found, tuple(self.trials), reduced, error, full, cost, ended
+        )
 
     def _reduce_text(self, original: str) -> tuple[str, float, bool]:
         """The reduced text, its error, whether the budget sufficed."""

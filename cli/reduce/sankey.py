@@ -36,7 +36,7 @@ class Stub:
 
 
 @dataclass(frozen=True, slots=True)
-class Pass:
+class BusTransfer:
     """Energy [J] that a coupling took from one bus to another."""
 
     label: str
@@ -60,7 +60,7 @@ class Flows:
     """Where the energy of a scene went; buses from those that feed to those that are fed."""
 
     buses: tuple[Bus, ...]
-    passes: tuple[Pass, ...]
+    passes: tuple[BusTransfer, ...]
 
 
 def flows(items: Iterable[Activity]) -> Flows:
@@ -104,18 +104,18 @@ def _total(stubs: Mapping[tuple[str, str], Sequence[float]]) -> float:
     return sum(map(sum, stubs.values()))
 
 
-def _passed_energy(passes: Iterable[Pass], name: str, *, into: bool) -> float:
+def _passed_energy(passes: Iterable[BusTransfer], name: str, *, into: bool) -> float:
     return sum(p.energy for p in passes if (p.target if into else p.source) == name and p.source != p.target)
 
 
-def _passes(label: str, ends: Sequence[tuple[str, float]]) -> Iterable[Pass]:
+def _passes(label: str, ends: Sequence[tuple[str, float]]) -> Iterable[BusTransfer]:
     """From the sides that absorbed to those that gave, by their parts."""
     given = [(name, -e) for name, e in ends if e < 0.0]
     whole = sum(e for _, e in given)
     for source, e in ((name, e) for name, e in ends if e > 0.0):
         for target, part in given:
             if target != source:
-                yield Pass(label, source, target, e * part / whole)
+                yield BusTransfer(label, source, target, e * part / whole)
 
 
 def _stubs(found: Mapping[tuple[str, str], Sequence[float]], least: float) -> tuple[Stub, ...]:

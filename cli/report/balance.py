@@ -18,7 +18,17 @@ from sysdyn.compiler.model.terms import canonical, local_variables, split, terms
 from sysdyn.dsl.model import dimensions as dim
 from sysdyn.dsl.model.calculus import differential, rate
 from sysdyn.dsl.model.expression import Node, add, const, index, mul, neg, sub, substitute, var
-from sysdyn.dsl.model.network import Branch, Dynamic, Energy, Initial, Loop, Network, Observation, State, Work
+from sysdyn.dsl.model.network import (
+    Branch,
+    Dynamic,
+    EnergyTerm,
+    InitialCondition,
+    Loop,
+    Network,
+    Observation,
+    State,
+    VirtualWork,
+)
 from sysdyn.dsl.model.rewriting import sum_over_loops
 from sysdyn.dsl.model.units import si
 from sysdyn.dsl.text.diagnostics import ModelError, Place
@@ -37,7 +47,7 @@ REST = 1e-6
 
 
 @dataclass(frozen=True, slots=True)
-class Part:
+class BalancePart:
     """An element or statement.  name: of its observation; power: expression is integrated, else an energy; domain: of
     the branch, or of the first coordinate that a statement reads.
     """
@@ -69,9 +79,9 @@ class Share:
     place: Place | None
 
 
-def add_observations(network: Network) -> tuple[Network, tuple[Part, ...]]:
+def add_observations(network: Network) -> tuple[Network, tuple[BalancePart, ...]]:
     """The network with a quadrature and an observation of each part; what cannot be written is left out."""
-    parts: list[Part] = []
+    parts: list[BalancePart] = []
     for found in (*_of_branches(network.branches), *_of_statements(network)):
         parts += found
         if len(parts) > MOST:
@@ -85,7 +95,7 @@ def add_observations(network: Network) -> tuple[Network, tuple[Part, ...]]:
             states.append(State(part.name, (), unit, part.place))
             value = var(part.name, "s")
             dynamics.append(Dynamic(value, part.expression, (), part.place))
-            initials.append(Initial(value, const(0.0), True, (), part.place))
+            initials.append(InitialCondition(value, const(0.0), True, (), part.place))
         extra.append(Observation(part.name, value, unit, part.label, part.place))
     richer = replace(
         network,
@@ -100,7 +110,7 @@ def add_observations(network: Network) -> tuple[Network, tuple[Part, ...]]:
     return richer, tuple(parts)
 
 
-def shares(trace: Trace, parts: Sequence[Part]) -> tuple[Share, ...]:
+def shares(trace: Trace, parts: Sequence[BalancePart]) -> tuple[Share, ...]:
     """The energies of a run."""
     found = []
     if not trace.time.size:
@@ -113,7 +123,7 @@ def shares(trace: Trace, parts: Sequence[Part]) -> tuple[Share, ...]:
     return (*found, *_of_jumps(trace, parts))
 
 
-def _of_jumps(trace: Trace, parts: Sequence[Part]) -> Iterator[Share]:
+def _of_jumps(trace: Trace, parts: Sequence[BalancePart]) -> Iterator[Share]:
     """What is stored less, and more, behind the instants that stand twice: impacts, and what events assign."""
     held = [trace[part.name].values for part in parts if part.role == "held"]
     if not held:
@@ -124,7 +134,7 @@ def _of_jumps(trace: Trace, parts: Sequence[Part]) -> Iterator[Share]:
             yield Share("impacts and events", role, float(energy), None)
 
 
-def _of_branches(branches: Sequence[Branch]) -> Iterator[list[Part]]:
+def _of_branches(branches: Sequence[Branch]) -> Iterator[list[BalancePart]]:
     """One part a family of branches (its pieces added)."""
     families: dict[str, list[Branch]] = {}
     for branch in branches:
@@ -139,7 +149,9 @@ def _of_branches(branches: Sequence[Branch]) -> Iterator[list[Part]]:
             if b.kind in ROLES
         ]
         label = f"{author_name(name)}{_ranges(pieces)}"
-        yield [Part(f"power of {name}", label, ROLES[first.kind], True, add(*power), first.place, first.domain.name)]
+        yield [
+            BalancePart(f"power of {name}", label, ROLES[first.kind], True, add(*power), first.place, first.domain.name)
+        ]
 
 
 def author_name(name: str) -> str:
@@ -157,13 +169,13 @@ def _ranges(pieces: Sequence[Branch]) -> str:
     return f"[{'…' if len(pieces) > 1 else ', '.join(own)}]" if own else ""
 
 
-def _of_statements(network: Network) -> Iterator[list[Part]]:
+def _of_statements(network: Network) -> Iterator[list[BalancePart]]:
     """Parts of energies and works, named by their line; those whose power cannot be written are left out."""
     counts: dict[str, int] = {}
     domains = {c.name: c.domain.name for c in network.coordinates if c.domain is not None}
-    statements: tuple[Energy | Work, ...] = (*network.energies, *network.works)
+    statements: tuple[EnergyTerm | VirtualWork, ...] = (*network.energies, *network.works)
     for statement in statements:
-        kind = statement.function if isinstance(statement, Energy) else "work"
+        kind = statement.function if isinstance(statement, EnergyTerm) else "work"
         counts[kind] = counts.get(kind, 0) + 1
         label = f"{kind} (line {statement.place.start[0]})"
         try:
@@ -172,12 +184,12 @@ def _of_statements(network: Network) -> Iterator[list[Part]]:
         except (ModelError, ValueError):  # a product over a range has no derivative here
             continue
         domain = next((domains[n.data[0]] for n in local_variables(value, _KINDS) if n.data[0] in domains), "")
-        yield [Part(f"power of {kind} {counts[kind]}", label, role, power, value, statement.place, domain)]
+        yield [BalancePart(f"power of {kind} {counts[kind]}", label, role, power, value, statement.place, domain)]
 
 
-def _measure(statement: Energy | Work) -> tuple[str, bool, Node]:
+def _measure(statement: EnergyTerm | VirtualWork) -> tuple[str, bool, Node]:
     """Role, whether it is a power, and the expression."""
-    if isinstance(statement, Work):
+    if isinstance(statement, VirtualWork):
         return "in", True, neg(_work(statement))
     if statement.function in ("D", "G"):
         return "out", True, _content(statement)
@@ -196,7 +208,7 @@ def _along(expression: Node, kinds: Sequence[str]) -> Node:
     return differential(expression, {f: f for f in local_variables(expression, kinds)})
 
 
-def _stored_energy(statement: Energy) -> Node:
+def _stored_energy(statement: EnergyTerm) -> Node:
     pieces = []
     for term in terms(flows(statement.expression), statement.loops, statement.place):
         kinds = _RATES.get(statement.function)
@@ -205,12 +217,12 @@ def _stored_energy(statement: Energy) -> Node:
     return add(*pieces)
 
 
-def _content(statement: Energy) -> Node:
+def _content(statement: EnergyTerm) -> Node:
     found = terms(flows(statement.expression), statement.loops, statement.place)
     return add(*(_sum_with_own_names(t.loops, _along(t.expression, _RATES[statement.function])) for t in found))
 
 
-def _work(statement: Work) -> Node:
+def _work(statement: VirtualWork) -> Node:
     nest, (effort, on) = canonical(statement.loops, flows(statement.effort), flows(statement.on))
     pieces = []
     for term in split(on, nest, statement.place):
@@ -229,10 +241,12 @@ def section(found: Sequence[Share] | None, link: Sequence[str], balance: float) 
         why = "there is no power in it, or its run failed or took long"
         return f'<p class="soft">The energies of the elements were not measured: {why}.</p>'
     rows = []
+    # a share stands in the column of its role
     for share, label in zip(found, link, strict=True):
         rows.append([label, *(joules(share.energy) if share.role == c else "" for c in WORDS)])
     sums = {c: sum(s.energy for s in found if s.role == c) for c in WORDS}
     rest = sums["held"] + sums["out"] - sums["in"]
+    # what no element accounts for, beyond the errors of integration
     if abs(rest) > max(REST * max(abs(s.energy) for s in found), 10.0 * abs(balance)):
         rows.append(["constraints and statements that move in time", "", "", joules(rest), ""])
         sums["in"] += rest

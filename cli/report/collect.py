@@ -9,10 +9,10 @@ from dataclasses import replace
 
 from sysdyn.cli.failures import UsageError
 from sysdyn.cli.report.balance import Share, add_observations, shares
-from sysdyn.cli.report.study import Study, sources_of
+from sysdyn.cli.report.report_study import ReportStudy, sources_of
 from sysdyn.cli.run.prepare import Prepared, prepare
 from sysdyn.cli.run.request import targets
-from sysdyn.cli.run.request.asked import Request, check_tolerances, of_these_alone, options_of
+from sysdyn.cli.run.request.run_request import RunRequest, check_tolerances, of_these_alone, options_of
 from sysdyn.cli.run.request.targets import Target
 from sysdyn.cli.run.running import Ran, integrate
 from sysdyn.cli.run.start.starting import start
@@ -28,13 +28,14 @@ LONG = 20.0
 Stages = list[tuple[str, float, float]]
 
 
-def collect(request: Request, report: Report, progress: Progress | None = None) -> Study | None:
+def collect(request: RunRequest, report: Report, progress: Progress | None = None) -> ReportStudy | None:
     """The study; None where the report says why there is none.  Call within `expression.fresh()`."""
     check_tolerances(request)
     stages: Stages = []
     began = time.monotonic()
     with _time_stage("read", stages):
         target = targets.target_of(request, report)
+    # the report has it
     if target is None:
         return None
     with _time_stage("check", stages):
@@ -44,6 +45,7 @@ def collect(request: Request, report: Report, progress: Progress | None = None) 
         report.extend(inner if network else targets.refuse_unsupported(inner))
     if network is None:
         return None
+    # from here on the run's own stages
     prepared = _prepare(request, network, report, stages)
     if prepared is None:
         return None
@@ -51,14 +53,14 @@ def collect(request: Request, report: Report, progress: Progress | None = None) 
 
 
 def _study(
-    request: Request,
+    request: RunRequest,
     target: Target,
     prepared: Prepared,
     report: Report,
     stages: Stages,
     began: float,
     progress: Progress | None,
-) -> Study | None:
+) -> ReportStudy | None:
     """Start and run a scene for the page, without a file; None where the report says why not."""
     scene = prepared.network.scene
     findings: list[str] = []
@@ -87,12 +89,12 @@ def _study(
         return None
     sources = sources_of(target, prepared.network)
     findings += [f"{d.code}: {d.message}" for d in report.diagnostics if d.severity != "note"]
-    return Study(
+    return ReportStudy(
         target, sources, prepared.network, prepared, started, ran, trace, found, tuple(findings), tuple(stages)
     )
 
 
-def _prepare(request: Request, network: Network, report: Report, stages: Stages) -> Prepared | None:
+def _prepare(request: RunRequest, network: Network, report: Report, stages: Stages) -> Prepared | None:
     """Compiled, with the compiler's own stages."""
     made: Stages = []
     with _time_stage("formulation, build and load", made):

@@ -5,10 +5,10 @@ from __future__ import annotations
 from sysdyn.cli.page.document import document, escape
 from sysdyn.cli.page.plots import SCRIPT, figures, hint
 from sysdyn.cli.report import balance, equations, paynter, run, schematic, text
-from sysdyn.cli.report.study import Study
+from sysdyn.cli.report.report_study import ReportStudy
 
 
-def page(study: Study) -> str:
+def page(study: ReportStudy) -> str:
     """The whole page."""
     title = study.target.name
     sections = [
@@ -37,7 +37,7 @@ def page(study: Study) -> str:
     return document(title, "\n".join(parts), script=SCRIPT)
 
 
-def _how(study: Study) -> str:
+def _how(study: ReportStudy) -> str:
     how = [study.prepared.formulation]
     if study.ran is not None:
         o = study.ran.outcome
@@ -47,14 +47,14 @@ def _how(study: Study) -> str:
     return ", ".join([study.sources[0].name, *how])
 
 
-def _traces(study: Study) -> str:
+def _traces(study: ReportStudy) -> str:
     if study.trace is None:
         return '<p class="soft">Nothing was run.</p>'
     meters = [name for name in ("audit.energy", "audit.constraints") if name in study.trace]
     return hint() + figures([(study.target.name, study.trace)], [*study.trace.names, *meters])
 
 
-def _balance(study: Study) -> str:
+def _balance(study: ReportStudy) -> str:
     if study.trace is None or study.shares is None:
         return balance.section(None, (), 0.0)
     energy = study.trace["audit.energy"].values

@@ -5,7 +5,7 @@ from __future__ import annotations
 from sysdyn.cli.equations.mathml import Typesetter, math, mi, mo, row
 from sysdyn.cli.page.document import escape, table
 from sysdyn.cli.report.balance import author_name
-from sysdyn.cli.report.study import Study
+from sysdyn.cli.report.report_study import ReportStudy
 from sysdyn.dsl.model.expression import var
 from sysdyn.dsl.model.network import Branch
 from sysdyn.runtime.model.description import BESIDE, count
@@ -43,7 +43,7 @@ _CO_KINDS = {
 MOST = 400
 
 
-def section(study: Study) -> str:
+def section(study: ReportStudy) -> str:
     """The diagram, the table of laws, the table of unknowns."""
     rows = [*_of_branches(study), *_of_statements(study)]
     heads = ("element or statement", "domain", *(_head(edge) for edge in EDGES))
@@ -57,7 +57,7 @@ def _head(edge: str) -> str:
     return f"<i>{text}</i>" + (f"–<i>{two}</i>" if two else "")
 
 
-def _of_branches(study: Study) -> list[list[str]]:
+def _of_branches(study: ReportStudy) -> list[list[str]]:
     """Rows of Paynter's diagram for branches and couplings: the law at its edge."""
     types = study.typesetter_of_text
     rows = []
@@ -93,7 +93,7 @@ def _where(branch: Branch, types: Typesetter) -> str:
     return f" {math(mo('['), *(types.expression(a) for a in branch.at), mo(']'))}" if branch.at else ""
 
 
-def _of_statements(study: Study) -> list[list[str]]:
+def _of_statements(study: ReportStudy) -> list[list[str]]:
     """Rows of Paynter's diagram for energies, works and constraints."""
     rows = []
     n = study.network
@@ -140,7 +140,7 @@ def _diagram(formulation: str) -> str:
     return f'{svg}{"".join(parts)}</svg><p class="soft">{escape(formulation)} is written in {words} (filled).</p>'
 
 
-def unknowns(study: Study) -> str:
+def unknowns(study: ReportStudy) -> str:
     """The unknowns of the formulation: name, kind, unit, how many."""
     kinds = _KINDS | _CO_KINDS if study.complementary else _KINDS
     types = study.typesetter

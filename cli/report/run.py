@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 from sysdyn.cli.page.document import escape, table
-from sysdyn.cli.report.study import Study
+from sysdyn.cli.report.report_study import ReportStudy
 from sysdyn.cli.run.start.author import names_of
 from sysdyn.cli.run.start.starting import changes_by_start
 from sysdyn.compiler.binding.certificate import certificate
@@ -16,7 +16,7 @@ SHOWN = 60
 _INDEX = {"2": "2 (stabilised)"}
 
 
-def passivity(study: Study) -> str:
+def passivity(study: ReportStudy) -> str:
     """The certificate: who may lose or supply energy, and how that is known."""
     found = certificate(study.prepared.network, study.prepared.binding)
     rows = [[study.link(f.place, escape(f.name)), f.role, f.how, escape(f.said)] for f in found.findings]
@@ -24,7 +24,7 @@ def passivity(study: Study) -> str:
     return said + (table(["element", "role", "known by", ""], rows, left=(0, 1, 2, 3)) if rows else "")
 
 
-def counts(study: Study) -> str:
+def counts(study: ReportStudy) -> str:
     """Coordinates, constraints, freedom, index as large numbers."""
     facts = study.started.facts
     index = "–" if facts.index is None else str(facts.index)
@@ -52,7 +52,7 @@ def counts(study: Study) -> str:
     return f'<div class="facts">{cells}</div>'
 
 
-def start(study: Study) -> str:
+def start(study: ReportStudy) -> str:
     """What the start changed, and where it begins."""
     state, system = study.started.state, study.started.system
     parts = []
@@ -87,7 +87,7 @@ def start(study: Study) -> str:
     return "".join(parts)
 
 
-def statistics(study: Study) -> str:
+def statistics(study: ReportStudy) -> str:
     """Counters of the run."""
     if study.ran is None or study.trace is None:
         return '<p class="soft">Nothing was run.</p>'
@@ -109,7 +109,7 @@ def _value(value: object) -> str:
     return "–" if value is None else f"{value:.2e}" if isinstance(value, float) else escape(str(value))
 
 
-def expectations(study: Study) -> str:
+def expectations(study: ReportStudy) -> str:
     """What the scene expects, and what was found."""
     claims = study.ran.claims if study.ran is not None else ()
     if not claims:
@@ -122,7 +122,7 @@ def expectations(study: Study) -> str:
     return table(("expect", "verdict", "value"), rows, left=(0, 1))
 
 
-def stages(study: Study) -> str:
+def stages(study: ReportStudy) -> str:
     """Wall and CPU time of each stage."""
     rows = [[escape(stage), f"{1e3 * wall:.1f}", f"{1e3 * cpu:.1f}"] for stage, wall, cpu in study.stages]
     wall, cpu = sum(s[1] for s in study.stages), sum(s[2] for s in study.stages)

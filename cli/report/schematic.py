@@ -12,7 +12,7 @@ from dataclasses import dataclass, field
 from sysdyn.cli.page.document import escape
 from sysdyn.cli.page.panels import COLOURS
 from sysdyn.cli.report.layout import places
-from sysdyn.cli.report.study import Study
+from sysdyn.cli.report.report_study import ReportStudy
 from sysdyn.dsl.model.expression import Node, topological
 from sysdyn.dsl.model.network import Branch, Loop, Shape, Terminal
 from sysdyn.dsl.text.diagnostics import Place
@@ -51,7 +51,7 @@ class Vertex:
     reads: set[str] = field(default_factory=set)
 
 
-def section(study: Study) -> str:
+def section(study: ReportStudy) -> str:
     """The picture and its legend."""
     colours = _Colours()
     vertices = _vertices(study, colours)
@@ -80,7 +80,7 @@ class _Colours:
         return found + ("<span>dashed: reads</span>" if reads else "")
 
 
-def _vertices(study: Study, colours: _Colours) -> dict[str, Vertex]:
+def _vertices(study: ReportStudy, colours: _Colours) -> dict[str, Vertex]:
     """Vertices of the drawing: nodes, coordinates, unknowns and states as dots, elements and statements as boxes."""
     n = study.network
     found: dict[str, Vertex] = {}
@@ -143,7 +143,7 @@ def _branch(found: dict[str, Vertex], branch: Branch, kinds: dict[str, str], col
     vertex.reads |= {o for o in _owners([branch.law] if branch.law is not None else [], found) if o not in near}
 
 
-def _statements(study: Study) -> Iterable[tuple[str, str, tuple[Loop, ...], Place, list[Node]]]:
+def _statements(study: ReportStudy) -> Iterable[tuple[str, str, tuple[Loop, ...], Place, list[Node]]]:
     n = study.network
     for e in n.energies:
         yield e.function, "content" if e.function in "DG" else "energy", e.loops, e.place, [e.expression]
@@ -184,7 +184,7 @@ def _indices(terminal: Terminal) -> str:
 # ---- drawing
 
 
-def _draw(study: Study, vertices: dict[str, Vertex]) -> str:
+def _draw(study: ReportStudy, vertices: dict[str, Vertex]) -> str:
     """The drawing as SVG: vertices in layers, wires under boxes."""
     neighbours: dict[str, list[str]] = {key: [] for key in vertices}
     size: dict[str, float] = {}
@@ -243,7 +243,7 @@ def _wires(vertices: dict[str, Vertex], at: dict[str, tuple[float, float]]) -> l
     return parts
 
 
-def _box(study: Study, vertex: Vertex, x: float, y: float) -> str:
+def _box(study: ReportStudy, vertex: Vertex, x: float, y: float) -> str:
     """A box with its label and kind, its grounds below, linked to its line of the text."""
     shape = f'x="{x - BOX / 2:.0f}" y="{y - 17:.0f}" width="{BOX:.0f}" height="34" rx="4"'
     body = [f'<rect class="box" {shape} stroke="{vertex.colour}"/>']
@@ -259,13 +259,13 @@ def _box(study: Study, vertex: Vertex, x: float, y: float) -> str:
     return _link(study, vertex.place, title + "".join(body))
 
 
-def _dot(study: Study, vertex: Vertex, x: float, y: float) -> str:
+def _dot(study: ReportStudy, vertex: Vertex, x: float, y: float) -> str:
     circle = f'<circle class="node" cx="{x:.0f}" cy="{y:.0f}" r="5.5" fill="{vertex.colour}"/>'
     text = f'<text class="label" x="{x:.0f}" y="{y - 10:.0f}" text-anchor="middle">{_short(vertex.label, 16)}</text>'
     return _link(study, vertex.place, f"<title>{escape(vertex.label)}</title>{circle}{text}")
 
 
-def _link(study: Study, place: Place | None, body: str) -> str:
+def _link(study: ReportStudy, place: Place | None, body: str) -> str:
     address = study.address(place)
     return f"<g>{body}</g>" if address is None else f'<a href="{address}">{body}</a>'
 

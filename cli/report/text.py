@@ -6,11 +6,11 @@ import re
 
 from sysdyn.cli.page.document import escape
 from sysdyn.cli.page.source_text import highlight
-from sysdyn.cli.report.study import Study
+from sysdyn.cli.report.report_study import ReportStudy
 from sysdyn.dsl.text.source import SourceText
 
 
-def section(study: Study) -> str:
+def section(study: ReportStudy) -> str:
     """The model's own text, then, folded, those it takes components from."""
     parts = []
     for k, source in enumerate(study.sources):

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 from sysdyn.cli.run.prepare import Prepared
 from sysdyn.cli.run.start.starting import Started
-from sysdyn.compiler.binding.sampled import Points, Sample, SampledRows
+from sysdyn.compiler.binding.sampled_rows import Points, Sample, SampledRows
 from sysdyn.compiler.forms.descriptor import Block
 from sysdyn.runtime.model.scales import group_maximum, magnitudes
 from sysdyn.runtime.model.system import LARGE, System

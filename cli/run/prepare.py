@@ -165,7 +165,7 @@ def _compile_and_load(
             first = getattr(error, "output", "").strip().splitlines()[:1]
             said = ": ".join([str(error), *first])
             report.note("N609", f"{said}: the NumPy backend takes over", network.place, help="--backend numpy")
-    from sysdyn.cli.run.generated import module_of
+    from sysdyn.cli.run.numpy_module import module_of
 
     compiled = compile_network(network, formulation, "numpy", traced=traced, gather=gather)
     return compiled, carrier.load(module_of(compiled.text)), "numpy"

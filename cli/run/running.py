@@ -15,11 +15,19 @@ from sysdyn.cli.run.many.memory import keep_pages
 from sysdyn.cli.run.module_check import check_module
 from sysdyn.cli.run.prepare import Prepared, prepare
 from sysdyn.cli.run.request import lock, targets
-from sysdyn.cli.run.request.asked import Request, check_tolerances, default_output, options_of, rest, stops, turning
+from sysdyn.cli.run.request.run_request import (
+    RunRequest,
+    check_tolerances,
+    default_output,
+    options_of,
+    rest,
+    stops,
+    turning,
+)
 from sysdyn.cli.run.request.targets import Target
 from sysdyn.cli.run.start.flat_laws import impossible
 from sysdyn.cli.run.start.starting import Started, start
-from sysdyn.cli.run.verdict.expectations import Claim, judge
+from sysdyn.cli.run.verdict.expectations import JudgedClaim, judge
 from sysdyn.cli.run.verdict.verdict import author_place, differences, note_rest, report_stop, verdict
 from sysdyn.compiler.forms.kane import repeats
 from sysdyn.dsl import load
@@ -44,7 +52,7 @@ class Ran:
     prepared: Prepared
     started: Started
     outcome: Outcome
-    claims: tuple[Claim, ...]
+    claims: tuple[JudgedClaim, ...]
     exit: int
     failure: str | None = None
 
@@ -56,11 +64,12 @@ def finding(diagnostics: Iterable[Diagnostic]) -> dict[str, Any] | None:
     return None if first is None else first.to_json()
 
 
-def run(request: Request, report: Report, progress: Progress | None = None) -> Ran | None:
+def run(request: RunRequest, report: Report, progress: Progress | None = None) -> Ran | None:
     """Simulate; None where the report says why not.  UsageError, OSError and TraceError pass through."""
     began = time.monotonic()
     keep_pages()
     check_tolerances(request)
+    # neither the model nor a file that is no trace is written over
     if request.output and request.file != "-" and _same(request.output, request.file):
         raise UsageError(f"-o {request.output} is the model itself")
     target = targets.target_of(request, report)
@@ -69,6 +78,7 @@ def run(request: Request, report: Report, progress: Progress | None = None) -> R
     output = request.output or default_output(request.file, target.scene.name.name if target.scene else "")
     if Path(output).is_file() and not replaceable(output):
         raise UsageError(f"-o {output} exists and is no trace of sysdyn: give another name, or remove it")
+    # FILE.lock of a trade, where there is one
     request, locked = _apply_lock(request, target, report)
     with ex.fresh():
         prepared = ready(request, target, report)
@@ -78,7 +88,7 @@ def run(request: Request, report: Report, progress: Progress | None = None) -> R
         return None if prepared is None or options is None else integrate(target, prepared, options, report)
 
 
-def _apply_lock(request: Request, target: Target, report: Report) -> tuple[Request, lock.Taken | None]:
+def _apply_lock(request: RunRequest, target: Target, report: Report) -> tuple[RunRequest, lock.Taken | None]:
     """The request with what the file's lock says where neither it nor the scene does."""
     held = None if request.no_lock else lock.read(request.file, target, __version__, report)
     if held is None:
@@ -100,7 +110,7 @@ def _under(options: Options, found: lock.Taken) -> Options:
     return replace(options, first=first, attributes={**options.attributes, "lock": found.text})
 
 
-def ready(request: Request, target: Target, report: Report) -> Prepared | None:
+def ready(request: RunRequest, target: Target, report: Report) -> Prepared | None:
     """The target under the request's settings, compiled and bound; None where the report says why not."""
     inner = Report()
     network = load.network(target.document, target.model, target.scene, inner, request.settings, levels=request.levels)
@@ -135,11 +145,13 @@ def begin(prepared: Prepared, options: Options, report: Report, *, checked: bool
     if started is None or any(d.severity == "error" and d.code != "E909" for d in report):
         return None
     number = started.system.form.written
+    # more memory than there is
     if number * budget.STEPPED > budget.there():
         need, most = (budget.format_bytes(amount) for amount in (number * budget.STEPPED, budget.there()))
         text = f"a run of {number} unknowns needs {need}, and there are {most}"
         report.error("E119", text, prepared.network.place, help="fewer elements")
         return None
+    # no unknowns and nothing traced
     if number == 0 and not started.system.description.rows_of("observe"):
         message = "nothing is unknown in the model, and nothing is traced: a run would hold nothing"
         report.error("E607", message, prepared.network.place, help="coord, state or node; or a quantity that is traced")

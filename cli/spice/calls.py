@@ -6,7 +6,7 @@ from collections.abc import Iterator
 from dataclasses import field
 
 from sysdyn.cli.spice.circuit import GROUND, Circuit, Netlist
-from sysdyn.cli.spice.netlist import Card, Unreadable
+from sysdyn.cli.spice.netlist import Card, UnreadableCard
 from sysdyn.cli.spice.parameters import read
 from sysdyn.values import dataclass
 
@@ -17,7 +17,7 @@ UNITS = {"r": "ohm", "c": "F", "l": "H"}
 
 
 @dataclass(slots=True)
-class Use:
+class CircuitUse:
     """What a circuit is for those that call it.
 
     reads: names of parameters that its text and what it calls read; named: by parameter that stays one, its unit;
@@ -32,20 +32,22 @@ class Use:
     height: int = 0
 
 
-class Calls:
+class CircuitCalls:
     """All circuits that the top reaches, each behind those that it calls.  Unreadable, with its card."""
 
     def __init__(self, netlist: Netlist) -> None:
         self.shared = netlist.shared
-        self.uses: dict[Circuit, Use] = {}
+        self.uses: dict[Circuit, CircuitUse] = {}
         names = _parameters(netlist.top)
         way, on = [netlist.top], {netlist.top}
-        opened: dict[Circuit, tuple[Use, Iterator[tuple[Card, Circuit]]]] = {}
+        opened: dict[Circuit, tuple[CircuitUse, Iterator[tuple[Card, Circuit]]]] = {}
         # depth first: a circuit after those that it calls
         while way:
             circuit = way[-1]
             if circuit not in opened:
-                use = Use(tuple(dict.fromkeys(n for c in circuit.elements.values() for n in nodes(c))), _calls(circuit))
+                use = CircuitUse(
+                    tuple(dict.fromkeys(n for c in circuit.elements.values() for n in nodes(c))), _calls(circuit)
+                )
                 opened[circuit] = use, iter(use.calls)
             use, rest = opened[circuit]
             call = next(rest, None)
@@ -59,7 +61,7 @@ class Calls:
                 way.append(call[1])
                 on.add(call[1])
 
-    def _finish(self, circuit: Circuit, use: Use, names: set[str]) -> None:
+    def _finish(self, circuit: Circuit, use: CircuitUse, names: set[str]) -> None:
         """What a circuit is when all that it calls is known."""
         inner = [self.uses[c] for c in dict.fromkeys(c for _, c in use.calls)]
         use.height = 1 + max((u.height for u in inner), default=0)
@@ -132,7 +134,7 @@ def _readings(circuit: Circuit, names: set[str]) -> tuple[set[str], dict[str, st
     return elsewhere & names, {n: u for n, u in alone.items() if n in names}
 
 
-def _unreadable(card: Card, reason: str) -> Unreadable:
-    error = Unreadable(reason)
+def _unreadable(card: Card, reason: str) -> UnreadableCard:
+    error = UnreadableCard(reason)
     error.card = card
     return error

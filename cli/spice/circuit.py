@@ -6,7 +6,7 @@ from collections.abc import Iterator
 from dataclasses import field
 
 from sysdyn.cli.spice.netlist import Card
-from sysdyn.cli.spice.parameters import Parameter
+from sysdyn.cli.spice.parameters import ParameterText
 from sysdyn.values import dataclass
 
 GROUND = ("0", "gnd")
@@ -16,7 +16,7 @@ USUAL = 27.0 + CELSIUS
 
 
 @dataclass(frozen=True, slots=True)
-class Model:
+class ModelCard:
     """`.model NAME KIND(...)`: texts of its values."""
 
     kind: str
@@ -31,10 +31,10 @@ class Circuit:
     name: str
     parent: Circuit | None = None
     ports: tuple[str, ...] = ()
-    parameters: dict[str, Parameter] = field(default_factory=dict)
+    parameters: dict[str, ParameterText] = field(default_factory=dict)
     elements: dict[str, Card] = field(default_factory=dict)
     inner: dict[str, Circuit] = field(default_factory=dict)
-    models: dict[str, Model] = field(default_factory=dict)
+    models: dict[str, ModelCard] = field(default_factory=dict)
 
     @property
     def enclosing(self) -> Iterator[Circuit]:

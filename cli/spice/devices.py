@@ -6,7 +6,7 @@ from collections.abc import Callable, Collection, Mapping
 from dataclasses import field
 
 from sysdyn.cli.spice.circuit import CELSIUS
-from sysdyn.cli.spice.netlist import Card, Unreadable, number, value
+from sysdyn.cli.spice.netlist import Card, UnreadableCard, number, value
 from sysdyn.cli.spice.sources import SHAPES, Asked, Shape, direct
 from sysdyn.cli.spice.temperature import Heat
 from sysdyn.cli.spice.writing import plain, quantity
@@ -16,7 +16,7 @@ SHORT = 1e-3  # ohm: SPICE's resistor of zero
 
 
 @dataclass(frozen=True, slots=True)
-class Element:
+class DeviceText:
     """Lines of the body; uses: components of std.electrical; local: components written beside; initial: lines of init;
     left_out: what the card says that the element does not have.
     """
@@ -29,7 +29,7 @@ class Element:
 
 
 @dataclass(frozen=True, slots=True)
-class Values:
+class ModelValues:
     """A model: its kind, and its numbers by name."""
 
     kind: str
@@ -37,7 +37,7 @@ class Values:
 
 
 @dataclass(slots=True)
-class Scope:
+class CircuitScope:
     """What cards of one circuit know: nodes and elements in the language's names, parameters, models.
 
     initial: V by node, of `.ic`; driven: capacitors whose voltage sources alone decide.
@@ -46,7 +46,7 @@ class Scope:
     node: Callable[[str], str]
     name: Mapping[str, str]
     known: Mapping[str, float]
-    model: Callable[[str], Values | None]
+    model: Callable[[str], ModelValues | None]
     asked: Asked
     uic: bool
     heat: Heat
@@ -62,11 +62,11 @@ def enough(card: Card, least: int) -> tuple[str, ...]:
     """The words of a card without brackets, so many at least."""
     words = tuple(w for w in card.words if w not in ("(", ")", ","))
     if len(words) < least:
-        raise Unreadable(f"'{card.text[:60]}' ends too early")
+        raise UnreadableCard(f"'{card.text[:60]}' ends too early")
     return words
 
 
-def number_of(scope: Scope, text: str, unit: str) -> str:
+def number_of(scope: CircuitScope, text: str, unit: str) -> str:
     """A quantity; the name of a parameter that has this unit stays one."""
     name = text.strip("{}'").strip()
     if scope.written.get(name) == unit:
@@ -90,18 +90,18 @@ class Details:
         """What a device does not read."""
         return (*self.rest, *(n for n in self.given if n not in (*read, "area", "m", "ic", "temp", "dtemp")))
 
-    def number(self, name: str, scope: Scope, default: float = 0.0) -> float:
+    def number(self, name: str, scope: CircuitScope, default: float = 0.0) -> float:
         """A number of the card."""
         return value(self.given[name], scope.known) if name in self.given else default
 
-    def heat(self, scope: Scope, nominal: float | None = None) -> Heat:
+    def heat(self, scope: CircuitScope, nominal: float | None = None) -> Heat:
         """Temperatures of the device; nominal: TNOM of its model, in Celsius."""
         now = scope.heat.now + self.number("dtemp", scope)
         now = self.number("temp", scope) + CELSIUS if "temp" in self.given else now
         return Heat(now, scope.heat.nominal if nominal is None else nominal + CELSIUS)
 
 
-def details(words: tuple[str, ...], scope: Scope, *, areas: bool) -> Details:
+def details(words: tuple[str, ...], scope: CircuitScope, *, areas: bool) -> Details:
     """Read what stands behind a device; areas: a number alone is AREA."""
     left_ = [w for w in words if w != "off"]
     times, given, rest = 1.0, dict[str, str](), []
@@ -125,7 +125,7 @@ def details(words: tuple[str, ...], scope: Scope, *, areas: bool) -> Details:
             rest.append(left_[0])
             left_ = left_[1:]
     if not times > 0.0:
-        raise Unreadable(f"{times:g} of a device are none")
+        raise UnreadableCard(f"{times:g} of a device are none")
     return Details(times, given, tuple(rest))
 
 
@@ -133,10 +133,12 @@ def _is_value(word: str) -> bool:
     return number(word) is not None or word[0] in "{'"
 
 
-def _passive(kind: str, letter: str, unit: str, state: str, state_unit: str) -> Callable[[Card, Scope], Element]:
+def _passive(
+    kind: str, letter: str, unit: str, state: str, state_unit: str
+) -> Callable[[Card, CircuitScope], DeviceText]:
     """The reader of R, C and L cards: value with temperature and number, and the initial value where it is said."""
 
-    def element(card: Card, scope: Scope) -> Element:
+    def element(card: Card, scope: CircuitScope) -> DeviceText:
         words = enough(card, 4)
         named = words[3:5] == (letter.lower(), "=")
         words = enough(card, 6) if named else words
@@ -153,15 +155,15 @@ def _passive(kind: str, letter: str, unit: str, state: str, state_unit: str) -> 
         initial: tuple[str, ...] = ()
         if state and card.head not in scope.driven:
             initial = (f"init {name}.{_initial(state, state_unit, words, said, scope)}",)
-        return Element((line,), (kind,), (), initial, left)
+        return DeviceText((line,), (kind,), (), initial, left)
 
     return element
 
 
-def _amount(scope: Scope, text: str, unit: str, factor: float) -> str:
+def _amount(scope: CircuitScope, text: str, unit: str, factor: float) -> str:
     """The value of an element: a parameter's name with a factor, or a quantity."""
     if not factor > 0.0:
-        raise Unreadable(f"{plain(factor)} of '{text}' are none")
+        raise UnreadableCard(f"{plain(factor)} of '{text}' are none")
     if scope.written and scope.written.get(text.strip("{}'").strip()) == unit:
         name = number_of(scope, text, unit)
         return name if factor == 1.0 else f"{plain(factor)}*{name}"
@@ -169,7 +171,7 @@ def _amount(scope: Scope, text: str, unit: str, factor: float) -> str:
     return quantity(SHORT if unit == "ohm" and amount == 0.0 else amount, unit)
 
 
-def _initial(state: str, unit: str, words: tuple[str, ...], said: Details, scope: Scope) -> str:
+def _initial(state: str, unit: str, words: tuple[str, ...], said: Details, scope: CircuitScope) -> str:
     """What a capacitor or a coil holds at the start: IC or `.ic` with UIC, else what it holds at rest."""
     if not scope.uic:
         return "f = 0 A" if state == "e" else "e = 0 V"
@@ -177,18 +179,18 @@ def _initial(state: str, unit: str, words: tuple[str, ...], said: Details, scope
     return f"{state} = {quantity(said.number('ic', scope, between), unit)}"
 
 
-def _source(unit: str) -> Callable[[Card, Scope], Element]:
+def _source(unit: str) -> Callable[[Card, CircuitScope], DeviceText]:
     """The reader of V and I cards."""
     kind, letter = ("voltage", "v") if unit == "V" else ("current", "i")
 
-    def element(card: Card, scope: Scope) -> Element:
+    def element(card: Card, scope: CircuitScope) -> DeviceText:
         words = enough(card, 3)
         name, a, b = scope.name[card.head], scope.node(words[1]), scope.node(words[2])
         shape = _shape(_words_after(card, 3), scope, unit)
         if shape.component:
             line = f"{name}: {shape.component}({shape.arguments}) {a} -> {b}"
-            return Element((line,), () if shape.local else (shape.component,), (shape.component,) * shape.local)
-        return Element((f"{name}: {kind}({letter} = {shape.expression}) {a} -> {b}",), (kind,))
+            return DeviceText((line,), () if shape.local else (shape.component,), (shape.component,) * shape.local)
+        return DeviceText((f"{name}: {kind}({letter} = {shape.expression}) {a} -> {b}",), (kind,))
 
     return element
 
@@ -205,7 +207,7 @@ SMALL = {"ac": 2, "distof1": 2, "distof2": 2}
 """What a source is in other analyses: a word and so many numbers at most."""
 
 
-def _shape(words: list[str], scope: Scope, unit: str) -> Shape:
+def _shape(words: list[str], scope: CircuitScope, unit: str) -> Shape:
     """The value over time: a shape where there is one, else DC; both, and what other analyses read, in any order."""
     asked = (unit, *scope.asked[1:])
     found, constant = None, None
@@ -223,7 +225,7 @@ def _shape(words: list[str], scope: Scope, unit: str) -> Shape:
         elif word != "dc" and constant is None and (_is_value(word) or word in scope.known):
             constant = value(word, scope.known)
         elif word != "dc":
-            raise Unreadable(f"'{word}': DC, AC, {', '.join(s.upper() for s in SHAPES)} are known")
+            raise UnreadableCard(f"'{word}': DC, AC, {', '.join(s.upper() for s in SHAPES)} are known")
     return found or direct(constant or 0.0, unit)
 
 
@@ -241,7 +243,7 @@ def _arguments(words: list[str]) -> tuple[list[str], list[str]]:
     return words[:end], words[end:]
 
 
-PLAIN: dict[str, Callable[[Card, Scope], Element]] = {
+PLAIN: dict[str, Callable[[Card, CircuitScope], DeviceText]] = {
     "r": _passive("resistor", "R", "ohm", "", ""),
     "c": _passive("capacitor", "C", "F", "e", "V"),
     "l": _passive("inductor", "L", "H", "f", "A"),

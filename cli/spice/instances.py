@@ -5,12 +5,12 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import field
 
-from sysdyn.cli.spice.calls import Calls
-from sysdyn.cli.spice.circuit import Circuit, Model
-from sysdyn.cli.spice.devices import Values
-from sysdyn.cli.spice.netlist import Card, Unreadable, value
+from sysdyn.cli.spice.calls import CircuitCalls
+from sysdyn.cli.spice.circuit import Circuit, ModelCard
+from sysdyn.cli.spice.devices import ModelValues
+from sysdyn.cli.spice.netlist import Card, UnreadableCard, value
 from sysdyn.cli.spice.parameters import evaluate
-from sysdyn.cli.spice.writing import Names
+from sysdyn.cli.spice.writing import NetlistNames
 from sysdyn.values import dataclass
 
 INFORMATION = ("mfg", "type", "iave", "vpk", "vceo", "icrating", "ron_typ", "vds", "qg")
@@ -18,7 +18,7 @@ INFORMATION = ("mfg", "type", "iave", "vpk", "vceo", "icrating", "ron_typ", "vds
 
 
 @dataclass(slots=True, eq=False)
-class Instance:
+class CircuitInstance:
     """A circuit with the values of its parameters.  caller: the first that calls it, whose parameters it reads too, as
     in SPICE; initial: V by node, of `.ic`; name: of its component.
     """
@@ -26,47 +26,47 @@ class Instance:
     circuit: Circuit
     known: Mapping[str, float]
     name: str
-    caller: Instance | None = None
+    caller: CircuitInstance | None = None
     initial: Mapping[str, float] = field(default_factory=dict)
-    models: dict[str, Values | None] = field(default_factory=dict)
+    models: dict[str, ModelValues | None] = field(default_factory=dict)
 
-    def model(self, name: str) -> Values | None:
+    def model(self, name: str) -> ModelValues | None:
         """A model that is known here, with its numbers."""
         if name not in self.models:
             self.models[name] = self._model(name)
         return self.models[name]
 
-    def _model(self, name: str) -> Values | None:
+    def _model(self, name: str) -> ModelValues | None:
         where = next((c for c in self.circuit.enclosing if name in c.models), None)
         if where is None:
             return None
-        around: Instance | None = self
+        around: CircuitInstance | None = self
         while around is not None and around.circuit is not where:
             around = around.caller
         return _values(where.models[name], (around or self).known)
 
 
-def _values(model: Model, known: Mapping[str, float]) -> Values:
+def _values(model: ModelCard, known: Mapping[str, float]) -> ModelValues:
     """A model's numbers.  Unreadable, with its card."""
     try:
         numbers = {n: value(text, known) for n, text in model.values.items() if n not in INFORMATION}
-    except Unreadable as error:
+    except UnreadableCard as error:
         error.card = model.card
         raise
-    return Values(model.kind, numbers)
+    return ModelValues(model.kind, numbers)
 
 
-class Instances:
+class CircuitInstances:
     """Gives each call its component; new ones wait in `found`."""
 
-    def __init__(self, calls: Calls, top: Instance, named: Names) -> None:
+    def __init__(self, calls: CircuitCalls, top: CircuitInstance, named: NetlistNames) -> None:
         self.calls, self._named = calls, named
         self.found = [top]
-        self._known: dict[tuple[object, ...], Instance] = {}
+        self._known: dict[tuple[object, ...], CircuitInstance] = {}
 
     def instance_of(
-        self, caller: Instance, card: Card, inner: Circuit, given: Mapping[str, float], at: list[str]
-    ) -> Instance:
+        self, caller: CircuitInstance, card: Card, inner: Circuit, given: Mapping[str, float], at: list[str]
+    ) -> CircuitInstance:
         """The instance that a call with these values at these nodes makes; parameters that stay named are not its."""
         use = self.calls.uses[inner]
         own = {n: v for n, v in given.items() if n not in use.named}
@@ -77,7 +77,7 @@ class Instances:
         key = (inner, around, read, tuple(sorted(initial.items())))
         found = self._known.get(key)
         if found is None:
-            found = Instance(inner, known, self._named.new(inner.name), caller, initial)
+            found = CircuitInstance(inner, known, self._named.new(inner.name), caller, initial)
             self._known[key] = found
             self.found.append(found)
         return found
@@ -92,7 +92,7 @@ class Instances:
         return {**shared, **inside, **{p: around[n] for p, n in zip(inner.ports, at, strict=True) if n in around}}
 
 
-def _callers(instance: Instance | None) -> list[Instance]:
+def _callers(instance: CircuitInstance | None) -> list[CircuitInstance]:
     """An instance and those that call it, innermost first."""
     found = []
     while instance is not None:

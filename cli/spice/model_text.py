@@ -6,26 +6,26 @@ import re
 from collections.abc import Callable, Collection, Iterable, Mapping
 from dataclasses import dataclass, field
 
-from sysdyn.cli.spice.calls import Calls, call
+from sysdyn.cli.spice.calls import CircuitCalls, call
 from sysdyn.cli.spice.circuit import GROUND, Circuit, Netlist
-from sysdyn.cli.spice.controlled import CONTROLLED
-from sysdyn.cli.spice.devices import PLAIN, Element, Scope
-from sysdyn.cli.spice.instances import Instance, Instances
+from sysdyn.cli.spice.controlled_sources import CONTROLLED
+from sysdyn.cli.spice.devices import PLAIN, CircuitScope, DeviceText
+from sysdyn.cli.spice.initial_conditions import across_sources, held_nodes
+from sysdyn.cli.spice.instances import CircuitInstance, CircuitInstances
 from sysdyn.cli.spice.local_components import LOCAL
-from sysdyn.cli.spice.netlist import Card, Unreadable, pairs, value
+from sysdyn.cli.spice.netlist import Card, UnreadableCard, pairs, value
 from sysdyn.cli.spice.scene_text import scene
 from sysdyn.cli.spice.semiconductors import SEMICONDUCTORS
-from sysdyn.cli.spice.starts import across_sources, held_nodes
 from sysdyn.cli.spice.temperature import Heat
 from sysdyn.cli.spice.windings import Cores, component, coupled_coils
-from sysdyn.cli.spice.writing import Names, names, quantity, wrap_lines
+from sysdyn.cli.spice.writing import NetlistNames, names, quantity, wrap_lines
 from sysdyn.dsl.elaborate.files import library_components
 from sysdyn.dsl.elaborate.instances.instances import BUILTINS
 from sysdyn.dsl.text.decoding import MAX_BYTES
 from sysdyn.dsl.text.diagnostics import Report
 from sysdyn.dsl.text.source import SourceText
 
-DEVICES: dict[str, Callable[[Card, Scope], Element]] = {**PLAIN, **CONTROLLED, **SEMICONDUCTORS}
+DEVICES: dict[str, Callable[[Card, CircuitScope], DeviceText]] = {**PLAIN, **CONTROLLED, **SEMICONDUCTORS}
 """By the first letter of a name; X and K are the circuit's."""
 
 
@@ -42,7 +42,7 @@ class _Names:
         if name in GROUND:
             return "ground"
         if name not in self.nodes:
-            raise Unreadable(f"'{name}' stands where a node is wanted")
+            raise UnreadableCard(f"'{name}' stands where a node is wanted")
         return self.nodes[name]
 
 
@@ -55,7 +55,7 @@ class _Written:
     components: list[str] = field(default_factory=list)
 
 
-class Writer:
+class ModelTextWriter:
     """Writes a netlist; findings with its lines go to the report."""
 
     def __init__(self, netlist: Netlist, source: SourceText, report: Report) -> None:
@@ -68,8 +68,8 @@ class Writer:
     def text(self) -> str:
         """The model's text; its layout is the formatter's."""
         try:
-            calls = Calls(self.netlist)
-        except Unreadable as error:
+            calls = CircuitCalls(self.netlist)
+        except UnreadableCard as error:
             self.report.error("E941", str(error), (error.card or self._any()).place)
             return ""
         self._tell_of_junctions(calls)
@@ -78,10 +78,10 @@ class Writer:
                 self.report.error("E941", f".ic of '{node}': there is no such node", card.place)
         library = {name for name, module in library_components().items() if module == "electrical"}
         coils = max((len(_coils(circuit)) for circuit in calls.uses), default=0)
-        given = Names(library.union(BUILTINS, LOCAL, (f"coils_{n}" for n in range(2, coils + 1))), "x_")
+        given = NetlistNames(library.union(BUILTINS, LOCAL, (f"coils_{n}" for n in range(2, coils + 1))), "x_")
         initial = {node: volt for node, (volt, _) in self.netlist.initial.items()} if self.netlist.uic else {}
-        top = Instance(self.netlist.top, self.netlist.known, "", None, initial)
-        instances = Instances(calls, top, given)
+        top = CircuitInstance(self.netlist.top, self.netlist.known, "", None, initial)
+        instances = CircuitInstances(calls, top, given)
         bodies = []
         for instance in instances.found:  # grows meanwhile
             bodies.append(self._body(instance, instances))
@@ -89,7 +89,7 @@ class Writer:
             self.written.components.append("\n".join([f"component {instance.name} {{", *body, "}", ""]))
         return self._whole(given.new(names([self.netlist.top.name], (), "m_")[self.netlist.top.name]), bodies[0])
 
-    def _tell_of_junctions(self, calls: Calls) -> None:
+    def _tell_of_junctions(self, calls: CircuitCalls) -> None:
         """Transistors have no diodes to their bulk here: only a coil drives a voltage beyond it in usual circuits."""
         cards = [card for circuit in calls.uses for card in circuit.elements.values()]
         first = next((card for card in cards if card.head.startswith("m")), None)
@@ -132,7 +132,7 @@ class Writer:
 
     # -- circuits --------------------------------------------------------------------------------------------------
 
-    def _names_of(self, circuit: Circuit, instances: Instances) -> _Names:
+    def _names_of(self, circuit: Circuit, instances: CircuitInstances) -> _Names:
         """Names of a circuit; where they are alike the earlier keeps its own."""
         if circuit not in self.names:
             use = instances.calls.uses[circuit]
@@ -144,7 +144,7 @@ class Writer:
             self.names[circuit] = _Names(written, nodes, labels)
         return self.names[circuit]
 
-    def _body(self, instance: Instance, instances: Instances) -> list[str]:
+    def _body(self, instance: CircuitInstance, instances: CircuitInstances) -> list[str]:
         """Lines of a model or component."""
         circuit, netlist = instance.circuit, self.netlist
         cards = list(circuit.elements.values())
@@ -152,7 +152,7 @@ class Writer:
         lines = [f"  param {named.written[n]} = {quantity(instance.known[n], u)}" for n, u in use.named.items()]
         for kind, which in (("port", use.ports), ("node", [n for n in named.nodes if n not in use.ports])):
             lines += [f"  {kind} {', '.join(named.nodes[n] for n in which)}: electrical"] if which else []
-        scope = Scope(
+        scope = CircuitScope(
             named.node, named.labels, instance.known, instance.model, self.asked, netlist.uic,
             Heat(netlist.temperature, netlist.nominal), (netlist.width, netlist.length), use.named,
             instance.initial, across_sources(cards),
@@ -176,7 +176,9 @@ class Writer:
             self.report.error("E941", text, self.netlist.initial[node][1].place, help="UIC, and C... IC=")
         return {head: f"init {named.labels[head]}.e = {quantity(volt, 'V')}" for head, volt in held.items()}
 
-    def _element(self, card: Card, scope: Scope, cores: Cores, write_call: Callable[[Card], Element]) -> Element:
+    def _element(
+        self, card: Card, scope: CircuitScope, cores: Cores, write_call: Callable[[Card], DeviceText]
+    ) -> DeviceText:
         """An element of a card; E941 of one that cannot be read, W941 of what is left out."""
         letter = card.head[0]
         try:
@@ -189,10 +191,10 @@ class Writer:
             elif letter in DEVICES:
                 found = DEVICES[letter](card, scope)
             else:
-                raise Unreadable(f"'{card.head}': elements of the letter {letter.upper()} are not known")
-        except Unreadable as error:
+                raise UnreadableCard(f"'{card.head}': elements of the letter {letter.upper()} are not known")
+        except UnreadableCard as error:
             self.report.error("E941", str(error), (error.card or card).place)
-            return Element(())
+            return DeviceText(())
         if found.left_out:
             text = f"'{card.head}': {', '.join(found.left_out)} of its card or model is left out"
             self.report.warning("W941", text, card.place, help="the run differs from SPICE's by what they do")
@@ -200,25 +202,25 @@ class Writer:
         self.written.local += found.local
         return found
 
-    def _call(self, card: Card, instance: Instance, instances: Instances, named: _Names) -> Element:
+    def _call(self, card: Card, instance: CircuitInstance, instances: CircuitInstances, named: _Names) -> DeviceText:
         """`X1 a b NAME p=1`."""
         name, at, words = call(card)
         inner = instance.circuit.find(name)
         if inner is None:
-            raise Unreadable(f"there is no subcircuit '{name}'")
+            raise UnreadableCard(f"there is no subcircuit '{name}'")
         if len(at) != len(inner.ports):
-            raise Unreadable(f"'{name}' has {len(inner.ports)} nodes, {len(at)} are given")
+            raise UnreadableCard(f"'{name}' has {len(inner.ports)} nodes, {len(at)} are given")
         given = {}
         for key, text in pairs(words):
             if key not in inner.parameters:
-                raise Unreadable(f"'{name}' has no parameter '{key}'")
+                raise UnreadableCard(f"'{name}' has no parameter '{key}'")
             given[key] = value(text, instance.known)
         found, use = instances.instance_of(instance, card, inner, given, at), instances.calls.uses[inner]
         inside = self._names_of(inner, instances)
         said = (f"{inside.written[n]} = {quantity(v, use.named[n])}" for n, v in given.items() if n in use.named)
         joined = _nodes_by_port(inner, at, use.ports, self.netlist.shared)
         ends = ", ".join(f"{inside.nodes[p]} = {named.node(n)}" for p, n in joined.items())
-        return Element((f"{named.labels[card.head]}: {found.name}({', '.join(said)}) {ends}",))
+        return DeviceText((f"{named.labels[card.head]}: {found.name}({', '.join(said)}) {ends}",))
 
 
 def _nodes_by_port(inner: Circuit, at: list[str], ports: Collection[str], shared: Mapping[str, None]) -> dict[str, str]:
@@ -227,7 +229,7 @@ def _nodes_by_port(inner: Circuit, at: list[str], ports: Collection[str], shared
     for port, node in given.items():
         whole = port in GROUND or port in shared
         if whole and port != node and not (port in GROUND and node in GROUND):
-            raise Unreadable(f"'{port}' is one node everywhere; as a node of '{inner.name}' it cannot be '{node}'")
+            raise UnreadableCard(f"'{port}' is one node everywhere; as a node of '{inner.name}' it cannot be '{node}'")
     return {p: given.get(p, p) for p in ports}
 
 

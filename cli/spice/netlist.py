@@ -27,7 +27,7 @@ MOST = 400
 """Characters of an expression."""
 
 
-class Unreadable(Exception):  # noqa: N818 (a finding)
+class UnreadableCard(Exception):  # noqa: N818 (a finding)
     """What a card says cannot be read; str: the reason; card: where it stands, if not where it is read."""
 
     card: Card | None = None
@@ -83,7 +83,7 @@ def pairs(words: Sequence[str]) -> list[tuple[str, str]]:
     found = []
     for k in range(0, len(plain), 3):
         if k + 2 >= len(plain) or plain[k + 1] != "=":
-            raise Unreadable(f"'{plain[k]}': NAME=VALUE is wanted")
+            raise UnreadableCard(f"'{plain[k]}': NAME=VALUE is wanted")
         found.append((plain[k], plain[k + 2]))
     return found
 
@@ -124,7 +124,7 @@ def value(text: str, known: Mapping[str, float]) -> float:
     """
     found = _value(text, known)
     if not math.isfinite(found):
-        raise Unreadable(f"'{text[:60]}' has no value")
+        raise UnreadableCard(f"'{text[:60]}' has no value")
     return found
 
 
@@ -137,7 +137,7 @@ def _value(text: str, known: Mapping[str, float]) -> float:
     if plain in known:
         return known[plain]
     if len(plain) > MOST:
-        raise Unreadable(f"an expression of more than {MOST} characters")
+        raise UnreadableCard(f"an expression of more than {MOST} characters")
 
     def written(match: re.Match[str]) -> str:
         return repr(scale_number(match[1], match[2] or ""))
@@ -149,9 +149,9 @@ def _value(text: str, known: Mapping[str, float]) -> float:
             tree = ast.parse(_SCALED.sub(written, plain.replace("^", "**")), mode="eval")
         return _walk(tree.body, known)
     except (SyntaxError, ValueError, RecursionError, MemoryError):
-        raise Unreadable(f"'{text}' is no number and no expression of parameters") from None
+        raise UnreadableCard(f"'{text}' is no number and no expression of parameters") from None
     except (ZeroDivisionError, OverflowError, TypeError):
-        raise Unreadable(f"'{text}' has no value") from None
+        raise UnreadableCard(f"'{text}' has no value") from None
 
 
 def _walk(node: ast.AST, known: Mapping[str, float]) -> float:
@@ -160,7 +160,7 @@ def _walk(node: ast.AST, known: Mapping[str, float]) -> float:
         return float(node.value)
     if isinstance(node, ast.Name):
         if node.id not in known and node.id not in CONSTANTS:
-            raise Unreadable(f"there is no parameter '{node.id}'")
+            raise UnreadableCard(f"there is no parameter '{node.id}'")
         return known[node.id] if node.id in known else CONSTANTS[node.id]
     if isinstance(node, ast.BinOp) and type(node.op) in _OPERATORS:
         return _OPERATORS[type(node.op)](_walk(node.left, known), _walk(node.right, known))
@@ -169,4 +169,4 @@ def _walk(node: ast.AST, known: Mapping[str, float]) -> float:
     called = node.func.id if isinstance(node, ast.Call) and isinstance(node.func, ast.Name) else ""
     if isinstance(node, ast.Call) and called in _FUNCTIONS and not node.keywords:
         return float(_FUNCTIONS[called](*(_walk(a, known) for a in node.args)))
-    raise Unreadable("an expression of numbers, parameters, + - * / ** and functions is wanted")
+    raise UnreadableCard("an expression of numbers, parameters, + - * / ** and functions is wanted")

@@ -6,14 +6,14 @@ import re
 from collections import ChainMap
 from collections.abc import Collection, Mapping
 
-from sysdyn.cli.spice.netlist import Card, Unreadable, value
+from sysdyn.cli.spice.netlist import Card, UnreadableCard, value
 from sysdyn.values import dataclass
 
 _NAME = re.compile(r"(?<![\w.])[a-z_]\w*")
 
 
 @dataclass(frozen=True, slots=True)
-class Parameter:
+class ParameterText:
     """The text of a value and the card that gives it."""
 
     text: str
@@ -26,7 +26,7 @@ def read(text: str) -> list[str]:
 
 
 def evaluate(
-    said: Mapping[str, Parameter], outer: Mapping[str, float], given: Mapping[str, float] | None = None
+    said: Mapping[str, ParameterText], outer: Mapping[str, float], given: Mapping[str, float] | None = None
 ) -> dict[str, float]:
     """Values by name; outer: what is known around; given: values that replace texts.  Unreadable, with its card.
 
@@ -53,19 +53,19 @@ def evaluate(
     return found
 
 
-def _missing(said: Mapping[str, Parameter], found: Collection[str], name: str) -> list[str]:
+def _missing(said: Mapping[str, ParameterText], found: Collection[str], name: str) -> list[str]:
     """What a parameter reads of its own circuit that has no value yet."""
     return [n for n in read(said[name].text) if n in said and n not in found and n != name]
 
 
-def _value(parameter: Parameter, known: Mapping[str, float]) -> float:
+def _value(parameter: ParameterText, known: Mapping[str, float]) -> float:
     try:
         return value(parameter.text, known)
-    except Unreadable as error:
+    except UnreadableCard as error:
         raise _unreadable(parameter.card, str(error)) from None
 
 
-def _unreadable(card: Card, reason: str) -> Unreadable:
-    error = Unreadable(reason)
+def _unreadable(card: Card, reason: str) -> UnreadableCard:
+    error = UnreadableCard(reason)
     error.card = card
     return error

@@ -7,9 +7,9 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import TypeVar
 
-from sysdyn.cli.spice.circuit import CELSIUS, Circuit, Model, Netlist
-from sysdyn.cli.spice.netlist import Card, Unreadable, cards, pairs, value
-from sysdyn.cli.spice.parameters import Parameter, evaluate
+from sysdyn.cli.spice.circuit import CELSIUS, Circuit, ModelCard, Netlist
+from sysdyn.cli.spice.netlist import Card, UnreadableCard, cards, pairs, value
+from sysdyn.cli.spice.parameters import ParameterText, evaluate
 from sysdyn.cli.spice.temperature import Heat
 from sysdyn.dsl.text.diagnostics import Report
 from sysdyn.dsl.text.source import SourceText, real
@@ -54,10 +54,10 @@ class Reader:
                 return  # what follows is another circuit
             try:
                 self._card(source, card)
-            except Unreadable as error:
+            except UnreadableCard as error:
                 self._refuse(error, card)
 
-    def _refuse(self, error: Unreadable, card: Card) -> None:
+    def _refuse(self, error: UnreadableCard, card: Card) -> None:
         self.report.error("E941", str(error), (error.card or card).place)
 
     def _card(self, source: SourceText, card: Card) -> None:
@@ -67,25 +67,25 @@ class Reader:
         if not head.startswith("."):
             _enter(inside.elements, head, card)
         elif head in (".param", ".params"):
-            inside.parameters |= {name: Parameter(text, card) for name, text in pairs(words[1:])}
+            inside.parameters |= {name: ParameterText(text, card) for name, text in pairs(words[1:])}
         elif head == ".subckt":
             self._begin(card)
         # back to the circuit around
         elif head == ".ends":
             if len(self._open) == 1:
-                raise Unreadable(".ends without .subckt")
+                raise UnreadableCard(".ends without .subckt")
             self._open.pop()
         # parentheses and commas separate as blanks do
         elif head == ".model":
             plain = [w for w in words if w not in ("(", ")", ",")]
             if len(plain) < 3:
-                raise Unreadable(".model NAME KIND(...)")
-            _enter(inside.models, plain[1], Model(plain[2], dict(pairs(plain[3:])), card))
+                raise UnreadableCard(".model NAME KIND(...)")
+            _enter(inside.models, plain[1], ModelCard(plain[2], dict(pairs(plain[3:])), card))
         elif head == ".global":
             self.netlist.shared |= dict.fromkeys(words[1:])
         # initial values name nodes of the top circuit
         elif head == ".ic" and inside is not self.netlist.top:
-            raise Unreadable("'.ic' inside a subcircuit: IC= at its capacitors, or '.ic v(x1.node)=...' outside")
+            raise UnreadableCard("'.ic' inside a subcircuit: IC= at its capacitors, or '.ic v(x1.node)=...' outside")
         # analyses and options are read when all parameters are known
         elif head in ASKED:
             self._asked.append(card)
@@ -97,21 +97,21 @@ class Reader:
         elif head in SKIPPED:
             self._skipped.append(card)
         elif head not in IGNORED:
-            raise Unreadable(f"'{head}' is not known")
+            raise UnreadableCard(f"'{head}' is not known")
 
     def _begin(self, card: Card) -> None:
         """Open a subcircuit: its ports up to the first NAME=VALUE, then its parameters."""
         words = [w for w in card.words[1:] if w not in ("params", "params:", ":", "(", ")", ",")]
         if not words:
-            raise Unreadable(".subckt NAME NODE ...")
+            raise UnreadableCard(".subckt NAME NODE ...")
         first = next((k for k, w in enumerate(words[1:], 1) if k + 1 < len(words) and words[k + 1] == "="), len(words))
         outer = self._open[-1]
         inner = Circuit(words[0], outer, tuple(words[1:first]))
         self._open.append(inner)  # also where it is refused below: its .ends is its own
-        inner.parameters |= {name: Parameter(text, card) for name, text in pairs(words[first:])}
+        inner.parameters |= {name: ParameterText(text, card) for name, text in pairs(words[first:])}
         # one node under two names would be two
         if len(set(inner.ports)) < len(inner.ports):
-            raise Unreadable(f"a node stands twice among those of '{words[0]}'")
+            raise UnreadableCard(f"a node stands twice among those of '{words[0]}'")
         _enter(outer.inner, words[0], inner)
 
     def _include(self, source: SourceText, card: Card) -> None:
@@ -119,7 +119,7 @@ class Reader:
         name = card.text.split(None, 1)[1].strip().strip("\"'") if len(card.words) > 1 else ""
         path = real(real(source.name).parent / name)
         if not path.is_relative_to(self.folder) or not path.is_file():
-            raise Unreadable(f"'{name}' is no file of the netlist's folder")
+            raise UnreadableCard(f"'{name}' is no file of the netlist's folder")
         if path in self._included:
             return
         self._included.add(path)
@@ -131,14 +131,14 @@ class Reader:
         netlist, top = self.netlist, self.netlist.top
         try:
             netlist.known = evaluate(top.parameters, {})
-        except Unreadable as error:
+        except UnreadableCard as error:
             self._refuse(error, next(iter(top.parameters.values())).card)
             netlist.top = Circuit(top.name)  # nothing else is known then
             return
         for card in self._asked:
             try:
                 ASKED[card.head](self, card, netlist.known)
-            except Unreadable as error:
+            except UnreadableCard as error:
                 self._refuse(error, card)
         if self._skipped:
             heads = ", ".join(f"'{head}'" for head in dict.fromkeys(card.head for card in self._skipped))
@@ -160,12 +160,12 @@ class Reader:
         words = [w for w in card.words[1:] if w not in ("(", ")", ",")]
         times = [value(w, known) for w in words if w != "uic"]
         if len(times) < 2:
-            raise Unreadable(".tran STEP STOP [START] [UIC]")
+            raise UnreadableCard(".tran STEP STOP [START] [UIC]")
         step, end = times[:2]
         if not (0.0 <= step < math.inf and 0.0 < end < math.inf):
-            raise Unreadable(f".tran {step:g} {end:g}: a step and an end after 0 s are wanted")
+            raise UnreadableCard(f".tran {step:g} {end:g}: a step and an end after 0 s are wanted")
         if self.netlist.tran is not None:
-            raise Unreadable("'.tran' stands here twice")
+            raise UnreadableCard("'.tran' stands here twice")
         start = times[2] if len(times) > 2 else 0.0
         self.netlist.tran, self.netlist.uic = (step, end, start), "uic" in words
 
@@ -173,7 +173,7 @@ class Reader:
         """`.temp T`, in Celsius."""
         words = [w for w in card.words[1:] if w not in ("=", ",")]
         if len(words) != 1:
-            raise Unreadable(".temp T: one temperature makes one circuit")
+            raise UnreadableCard(".temp T: one temperature makes one circuit")
         self.netlist.temperature = _kelvin(words[0], known)
 
     def _options(self, card: Card, known: Mapping[str, float]) -> None:
@@ -197,7 +197,7 @@ class Reader:
         # lengths of all devices
         elif name == "scale":
             if value(text, known) != 1.0:
-                raise Unreadable(f"the option scale={text}: lengths as they are, without it, are wanted")
+                raise UnreadableCard(f"the option scale={text}: lengths as they are, without it, are wanted")
         # what it does is not known here
         elif name not in TOLERATED:
             text = f"the option '{name}' is not known and left out"
@@ -222,7 +222,7 @@ T = TypeVar("T")
 def _enter(known: dict[str, T], name: str, what: T) -> None:
     """What has a name of its own."""
     if name in known:
-        raise Unreadable(f"'{name}' stands here twice")
+        raise UnreadableCard(f"'{name}' stands here twice")
     known[name] = what
 
 
@@ -236,7 +236,7 @@ def _nodes(words: tuple[str, ...], known: Mapping[str, float]) -> list[tuple[str
     found, rest = [], list(words)
     while rest:
         if rest[:2] != ["v", "("] or rest[3:5] != [")", "="] or len(rest) < 6:
-            raise Unreadable(".ic V(NODE)=VALUE")
+            raise UnreadableCard(".ic V(NODE)=VALUE")
         found.append((rest[2], value(rest[5], known)))
         del rest[: 7 if rest[6:7] == [","] else 6]
     return found

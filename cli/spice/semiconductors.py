@@ -4,32 +4,32 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 
-from sysdyn.cli.spice.devices import Details, Element, Scope, Values, details, enough
-from sysdyn.cli.spice.netlist import Card, Unreadable
+from sysdyn.cli.spice.devices import CircuitScope, Details, DeviceText, ModelValues, details, enough
+from sysdyn.cli.spice.netlist import Card, UnreadableCard
 from sysdyn.cli.spice.writing import plain, quantity
 
 OXIDE = 3.9 * 8.854214871e-12  # F/m, permittivity
 MOBILITY = 600.0  # cm^2/V/s, UO where nothing is said
 
 
-def _model(scope: Scope, name: str, kinds: tuple[str, ...]) -> Values:
+def _model(scope: CircuitScope, name: str, kinds: tuple[str, ...]) -> ModelValues:
     """A model of these kinds, of level 1: other levels are other devices."""
     found = scope.model(name)
     if found is None:
-        raise Unreadable(f"there is no .model {name}")
+        raise UnreadableCard(f"there is no .model {name}")
     if found.kind not in kinds:
-        raise Unreadable(f".model {name} is {found.kind}, wanted is {' or '.join(kinds)}")
+        raise UnreadableCard(f".model {name} is {found.kind}, wanted is {' or '.join(kinds)}")
     if found.values.get("level", 1.0) != 1.0:
-        raise Unreadable(f".model {name}: level={found.values['level']:g} is another device; level 1 is known")
+        raise UnreadableCard(f".model {name}: level={found.values['level']:g} is another device; level 1 is known")
     return found
 
 
-def _beyond(model: Values, read: tuple[str, ...]) -> tuple[str, ...]:
+def _beyond(model: ModelValues, read: tuple[str, ...]) -> tuple[str, ...]:
     """What a model says beside what the element reads; zero is SPICE's word for none."""
     return tuple(k for k, v in model.values.items() if k not in (*read, "level") and v != 0.0)
 
 
-def _diode(card: Card, scope: Scope) -> Element:
+def _diode(card: Card, scope: CircuitScope) -> DeviceText:
     """A diode with its series resistance as an element and a node of its own."""
     words = enough(card, 4)
     name, a, b = scope.name[card.head], scope.node(words[1]), scope.node(words[2])
@@ -37,7 +37,7 @@ def _diode(card: Card, scope: Scope) -> Element:
     v, said = model.values, details(words[4:], scope, areas=True)
     emission, heat = v.get("n", 1.0), said.heat(scope, v.get("tnom"))
     if not emission > 0.0:
-        raise Unreadable(f".model {words[3]}: n = {emission:g} is no emission coefficient")
+        raise UnreadableCard(f".model {words[3]}: n = {emission:g} is no emission coefficient")
     # the saturation current of this area at this temperature
     current = v.get("is", 1e-14) * said.times * heat.saturation(v.get("eg", 1.11), v.get("xti", 3.0), emission)
     given = f"Is = {quantity(current, 'A')}, vT = {quantity(emission * heat.volt, 'V')}"
@@ -52,11 +52,11 @@ def _diode(card: Card, scope: Scope) -> Element:
             f"{name}: diode({given}) {inner} -> {b}",
             f"{name}_series: resistor(R = {quantity(ohms, 'ohm')}) {a} -> {inner}",
         )
-        return Element(lines, ("diode", "resistor"), (), (), left)
-    return Element((f"{name}: diode({given}) {a} -> {b}",), ("diode",), (), (), left)
+        return DeviceText(lines, ("diode", "resistor"), (), (), left)
+    return DeviceText((f"{name}: diode({given}) {a} -> {b}",), ("diode",), (), (), left)
 
 
-def _bipolar(card: Card, scope: Scope) -> Element:
+def _bipolar(card: Card, scope: CircuitScope) -> DeviceText:
     """Ebers and Moll from the transport form: aF Ies = aR Ics = IS, aF = BF/(1 + BF)."""
     words = enough(card, 5)
     # the substrate node is optional
@@ -68,7 +68,7 @@ def _bipolar(card: Card, scope: Scope) -> Element:
     gain = heat.ratio ** v.get("xtb", 0.0)
     forward, backward = v.get("bf", 100.0) * gain, v.get("br", 1.0) * gain
     if not (forward > 0.0 and backward > 0.0):
-        raise Unreadable(f".model {words[at]}: bf and br above 0 are wanted")
+        raise UnreadableCard(f".model {words[at]}: bf and br above 0 are wanted")
     # gains of the common base circuit
     ahead, behind = forward / (1.0 + forward), backward / (1.0 + backward)
     volt = quantity(heat.volt * v.get("nf", 1.0), "V")
@@ -86,10 +86,10 @@ def _bipolar(card: Card, scope: Scope) -> Element:
         current, other = (saturation / ahead, e) if b == c else (saturation / behind, c)
         ends = f"{b} -> {other}" if model.kind == "npn" else f"{other} -> {b}"
         law = f"Is = {quantity(current, 'A')}, vT = {volt}"
-        return Element((f"{name}: diode({law}) {ends}",), ("diode",), (), (), left)
+        return DeviceText((f"{name}: diode({law}) {ends}",), ("diode",), (), (), left)
     # the library has npn; pnp is written into the model
     uses, local = (("npn",), ()) if model.kind == "npn" else ((), ("pnp",))
-    return Element((f"{name}: {model.kind}({given}) c = {c}, b = {b}, e = {e}",), uses, local, (), left)
+    return DeviceText((f"{name}: {model.kind}({given}) c = {c}, b = {b}, e = {e}",), uses, local, (), left)
 
 
 JUNCTIONS = {"ad", "as", "pd", "ps"}
@@ -97,7 +97,7 @@ JUNCTIONS = {"ad", "as", "pd", "ps"}
 CAPACITIES = {"cj", "cjsw", "js", "jssw"}
 
 
-def _mos(card: Card, scope: Scope) -> Element:
+def _mos(card: Card, scope: CircuitScope) -> DeviceText:
     """Shichman and Hodges: beta = KP W/L, KP from UO and TOX where it is not said."""
     words = enough(card, 6)
     model = _model(scope, words[5], ("nmos", "pmos"))
@@ -106,14 +106,16 @@ def _mos(card: Card, scope: Scope) -> Element:
     width, length = said.number("w", scope, scope.size[0]), said.number("l", scope, scope.size[1])
     length -= 2.0 * v.get("ld", 0.0)
     if not (width > 0.0 and length > 0.0):
-        raise Unreadable(f"'{card.head}': {plain(width)} m of width and {plain(length)} m of length are no transistor")
+        raise UnreadableCard(
+            f"'{card.head}': {plain(width)} m of width and {plain(length)} m of length are no transistor"
+        )
     beta = _transconductance(v) * width / length * said.times * heat.ratio**-1.5
     volts = heat.threshold(v.get("vto", v.get("vt0", 0.0)), v.get("phi", 0.6), sign)
     given = f"beta = {plain(beta)} A/V^2, vto = {quantity(volts, 'V')}, lambda = {plain(v.get('lambda', 0.0))} V^-1"
     d, g, s = (scope.node(w) for w in words[1:4])
     line = f"{scope.name[card.head]}: {model.kind}({given}) d = {d}, g = {g}, s = {s}"
     left = (*_beyond(model, ("kp", "vto", "vt0", "lambda", "tnom", "phi", "uo", "u0", "ld")), *_sizes(said, v))
-    return Element((line,), (), (model.kind,), (), left)
+    return DeviceText((line,), (), (model.kind,), (), left)
 
 
 def _transconductance(v: Mapping[str, float]) -> float:
@@ -131,5 +133,5 @@ def _sizes(said: Details, v: Mapping[str, float]) -> tuple[str, ...]:
     return tuple(w for w in said.unread_words("w", "l", "ic 2") if w not in unread)
 
 
-SEMICONDUCTORS: dict[str, Callable[[Card, Scope], Element]] = {"d": _diode, "q": _bipolar, "m": _mos}
+SEMICONDUCTORS: dict[str, Callable[[Card, CircuitScope], DeviceText]] = {"d": _diode, "q": _bipolar, "m": _mos}
 """By the first letter of a name."""

@@ -9,7 +9,7 @@ import math
 from collections.abc import Callable
 from itertools import pairwise
 
-from sysdyn.cli.spice.netlist import Unreadable
+from sysdyn.cli.spice.netlist import UnreadableCard
 from sysdyn.cli.spice.writing import plain, quantity
 from sysdyn.values import dataclass
 
@@ -44,7 +44,7 @@ def direct(number: float, unit: str) -> Shape:
 def _check_count(v: list[float], most: int, form: str) -> None:
     """No value behind those of a shape."""
     if any(v[most:]):
-        raise Unreadable(f"{form}: a value more than these, {v[most]:g}, is not known")
+        raise UnreadableCard(f"{form}: a value more than these, {v[most]:g}, is not known")
 
 
 def _sine(v: list[float], asked: Asked) -> Shape:
@@ -85,7 +85,7 @@ def _pulse(v: list[float], asked: Asked) -> Shape:
     edge = step or STEEP * min(width, _value_or(v, 6, 0.0) or end, end)
     rise, fall = _value_or(v, 3, 0.0) or edge, _value_or(v, 4, 0.0) or edge
     if not (rise > 0.0 and fall > 0.0 and width >= 0.0):
-        raise Unreadable("PULSE: times of rising, falling and between them from 0 s on are wanted")
+        raise UnreadableCard("PULSE: times of rising, falling and between them from 0 s on are wanted")
     whole = rise + width + fall
     period = _value_or(v, 6, 0.0) or 2.0 * end + whole
     period = max(period, whole) if delay + period >= end else period
@@ -108,7 +108,7 @@ def _exponential(v: list[float], asked: Asked) -> Shape:
     one, tau = _value_or(v, 2, 0.0), _value_or(v, 3, 0.0) or step
     two, fade = _value_or(v, 4, 0.0) or one + step, _value_or(v, 5, 0.0) or step
     if not (tau > 0.0 and fade > 0.0):
-        raise Unreadable("EXP: time constants above 0 s are wanted")
+        raise UnreadableCard("EXP: time constants above 0 s are wanted")
     size = _as_factor(quantity(high - low, unit))
 
     def side(delay: float, time: float, sign: str) -> str:
@@ -123,7 +123,7 @@ def _lines(v: list[float], asked: Asked) -> Shape:
     unit = asked[0]
     times, values = v[0::2], v[1::2]
     if len(times) != len(values) or len(times) < 2 or any(b <= a for a, b in pairwise(times)):
-        raise Unreadable("PWL(T1 V1 T2 V2 ...): at least two points at ascending instants")
+        raise UnreadableCard("PWL(T1 V1 T2 V2 ...): at least two points at ascending instants")
     kind, letter = ("piecewise_voltage", "v") if unit == "V" else ("piecewise_current", "i")
     at, levels = (", ".join(quantity(x, u) for x in w) for w, u in ((times, "s"), (values, unit)))
     return Shape("", kind, f"n = {len(times)}, at = [{at}], {letter} = [{levels}]", unit != "V")

@@ -8,7 +8,7 @@ from __future__ import annotations
 import math
 
 from sysdyn.cli.spice.circuit import USUAL
-from sysdyn.cli.spice.netlist import Unreadable
+from sysdyn.cli.spice.netlist import UnreadableCard
 from sysdyn.values import dataclass
 
 BOLTZMANN = 1.380649e-23 / 1.602176634e-19
@@ -26,7 +26,7 @@ class Heat:
 
     def __post_init__(self) -> None:
         if not (1.0 <= self.now <= MOST and 1.0 <= self.nominal <= MOST):
-            raise Unreadable(f"{self.now:g} K with a model of {self.nominal:g} K is no temperature of a device")
+            raise UnreadableCard(f"{self.now:g} K with a model of {self.nominal:g} K is no temperature of a device")
 
     @property
     def ratio(self) -> float:

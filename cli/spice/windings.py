@@ -6,8 +6,8 @@ import math
 from collections.abc import Mapping, Sequence
 from itertools import combinations
 
-from sysdyn.cli.spice.devices import Element, Scope, details, enough, number_of
-from sysdyn.cli.spice.netlist import Card, Unreadable, value
+from sysdyn.cli.spice.devices import CircuitScope, DeviceText, details, enough, number_of
+from sysdyn.cli.spice.netlist import Card, UnreadableCard, value
 from sysdyn.cli.spice.writing import plain, quantity
 
 Factors = dict[tuple[str, str], str]
@@ -19,7 +19,7 @@ def _coils_and_factor(card: Card, coils: Mapping[str, Card]) -> tuple[tuple[str,
     words = enough(card, 4)
     names, factor = words[1:-1], words[-1]
     if any(w not in coils for w in names) or len(set(names)) < len(names):
-        raise Unreadable(f"'{card.text[:60]}': two coils of this circuit or more and a factor are wanted")
+        raise UnreadableCard(f"'{card.text[:60]}': two coils of this circuit or more and a factor are wanted")
     return names, factor
 
 
@@ -44,7 +44,7 @@ class Cores:
         for card in (c for c in cards if c.head.startswith("k")):
             try:
                 self._said[card.head] = _coils_and_factor(card, coils)
-            except Unreadable:
+            except UnreadableCard:
                 continue  # told where the card is read
             twos = _twos(self._said[card.head][0])
             if again := before.intersection(twos):
@@ -78,7 +78,7 @@ class Cores:
         if card.head not in self._said:
             _coils_and_factor(card, self.coils)
         if again := self._again.get(card.head):
-            raise Unreadable(f"'{card.head}': {' and '.join(again)} are coupled already")
+            raise UnreadableCard(f"'{card.head}': {' and '.join(again)} are coupled already")
         return self._core[card.head]
 
 
@@ -86,16 +86,16 @@ def _branch(k: int, coils: int) -> str:
     return ("one", "two")[k] if coils == 2 else f"c{k + 1}"
 
 
-def coupled_coils(card: Card, scope: Scope, cores: Cores) -> Element:
+def coupled_coils(card: Card, scope: CircuitScope, cores: Cores) -> DeviceText:
     """The coils of a core as one element, at the first of its cards."""
     first, names, factors = cores.core_of(card)
     # the core stands at the first of its cards
     if first != card.head:
-        return Element(())
+        return DeviceText(())
     name, size = scope.name[card.head], len(names)
     strength = {two: value(factor, scope.known) for two, factor in factors.items()}
     if not all(abs(k) <= 1.0 for k in strength.values()):
-        raise Unreadable(f"'{card.head}': a factor beyond 1")
+        raise UnreadableCard(f"'{card.head}': a factor beyond 1")
     whole = any(abs(k) == 1.0 for k in strength.values())  # what two coils carry is one flux: no current is given
     # two coils that are not perfectly coupled: a component of the library
     pair = size == 2 and not whole
@@ -123,7 +123,7 @@ def coupled_coils(card: Card, scope: Scope, cores: Cores) -> Element:
     kind = "coupled_inductors" if pair else f"coils_{size}"
     line = f"{name}: {kind}({', '.join(given)}) {', '.join(ends)}"
     uses, local = ((kind,), ()) if pair else ((), (kind,))
-    return Element((line,), uses, local, tuple(initial), tuple(dict.fromkeys(left)))
+    return DeviceText((line,), uses, local, tuple(initial), tuple(dict.fromkeys(left)))
 
 
 def component(size: int) -> str:

@@ -6,7 +6,7 @@ import math
 import re
 from collections.abc import Collection
 
-from sysdyn.cli.spice.netlist import Unreadable
+from sysdyn.cli.spice.netlist import UnreadableCard
 from sysdyn.dsl.format.format import format_text
 from sysdyn.dsl.format.layout import WIDTH
 from sysdyn.dsl.parser.lexing import RESERVED
@@ -26,7 +26,7 @@ WORDS = RESERVED | frozenset(_WORDS.split())
 def quantity(number: float, unit: str) -> str:
     """`4.7 kohm`, to fifteen digits; a plain number where there is no unit."""
     if not math.isfinite(number):
-        raise Unreadable(f"{number:g} {unit} is no value")
+        raise UnreadableCard(f"{number:g} {unit} is no value")
     if not unit:
         return plain(number)
     digits = 3 * math.floor(math.log10(abs(number)) / 3.0) if number else 0
@@ -80,7 +80,7 @@ def format_fast(text: str) -> str:
     return re.sub(r"(?m)^  # (\d+)\n", lambda found: runs[int(found[1])], laid)
 
 
-class Names:
+class NetlistNames:
     """Gives each name of a netlist one of the language that is not taken: its own where it is one."""
 
     def __init__(self, taken: Collection[str], prefix: str) -> None:
@@ -102,5 +102,5 @@ class Names:
 
 def names(words: Collection[str], taken: Collection[str], prefix: str) -> dict[str, str]:
     """A name of the language for each name of the netlist."""
-    given = Names(taken, prefix)
+    given = NetlistNames(taken, prefix)
     return {word: given.new(word) for word in words}

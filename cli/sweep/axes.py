@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from scipy.special import ndtri
 from sysdyn.cli.failures import UsageError
 from sysdyn.cli.options import FORMULATIONS, INDICES, METHODS
-from sysdyn.cli.run.request.asked import separate
+from sysdyn.cli.run.request.run_request import separate
 from sysdyn.values import dataclass
 
 Numbers = NDArray[np.float64]

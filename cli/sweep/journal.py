@@ -15,11 +15,11 @@ from typing import Self
 
 from sysdyn.cli import whole_files
 from sysdyn.cli.failures import UsageError
-from sysdyn.cli.sweep.kept import Block, Done, Item, Kept
+from sysdyn.cli.sweep.run_records import Done, Item, Kept, KeptRuns
 from sysdyn.runtime.model.failures import TraceError
 
 
-class Journal:
+class SweepJournal:
     """`.NAME.runs` beside the result; done: what it holds already, by number of the run."""
 
     def __init__(self, output: Path, digest: str) -> None:
@@ -48,7 +48,7 @@ class Journal:
             )
         with self._report_damage():
             for line in lines[1:]:
-                self.done.take(Block.from_json(line["block"]) if "block" in line else Kept(**line))
+                self.done.take(KeptRuns.from_json(line["block"]) if "block" in line else Kept(**line))
         if whole != text:
             self.path.write_bytes(whole)
 
@@ -67,7 +67,7 @@ class Journal:
     def take(self, item: Item) -> None:
         """Keeps a result."""
         self.done.take(item)
-        self._line({"block": item.to_json()} if isinstance(item, Block) else item.to_json())
+        self._line({"block": item.to_json()} if isinstance(item, KeptRuns) else item.to_json())
 
     def remove(self) -> None:
         """All runs stand in the result."""

@@ -20,9 +20,9 @@ from typing import Any
 
 from sysdyn.cli.failures import UsageError
 from sysdyn.cli.run.many.crew import DEATHS
-from sysdyn.cli.run.request.asked import Request
-from sysdyn.cli.sweep.kept import Item, Kept
+from sysdyn.cli.run.request.run_request import RunRequest
 from sysdyn.cli.sweep.one_run import Runner, Task
+from sysdyn.cli.sweep.run_records import Item, Kept
 from sysdyn.cli.sweep.workers import Answer, Chunk, Queue, answer
 from sysdyn.dsl.text.source import real
 
@@ -32,11 +32,11 @@ POLL = 0.3
 """s: how often it is looked which workers are there."""
 ALONE = 60.0
 """s without any worker after which the sweep is given up (it goes on where it was)."""
-_runners: dict[tuple[Request, str], Runner] = {}
+_runners: dict[tuple[RunRequest, str], Runner] = {}
 _one = threading.Lock()
 
 
-def work(request: Request, keep: str, chunk: Chunk) -> tuple[Answer, float]:
+def work(request: RunRequest, keep: str, chunk: Chunk) -> tuple[Answer, float]:
     """On a worker: what came of a chunk, and how long it took [s].  One at a time, however many threads it has."""
     with _one:
         began = time.monotonic()
@@ -45,7 +45,7 @@ def work(request: Request, keep: str, chunk: Chunk) -> tuple[Answer, float]:
         return found, time.monotonic() - began
 
 
-Work = Callable[[Request, str, Chunk], tuple[Answer, float]]
+Work = Callable[[RunRequest, str, Chunk], tuple[Answer, float]]
 
 
 @dataclass(slots=True)
@@ -61,7 +61,7 @@ class _Crew:
     """What each worker (by address) was given; careful: what may have killed a worker."""
 
     client: Any
-    request: Request
+    request: RunRequest
     keep: str
     queue: Queue
     work: Work
@@ -181,7 +181,7 @@ class _Crew:
 
 
 def results(
-    request: Request, tasks: Iterable[Task], number: int, address: str, keep: str = "traces", work: Work = work
+    request: RunRequest, tasks: Iterable[Task], number: int, address: str, keep: str = "traces", work: Work = work
 ) -> Iterator[Item]:
     """What is kept of `number` tasks by the workers of the scheduler at `address`, as it is ready.
 

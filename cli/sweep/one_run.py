@@ -9,12 +9,12 @@ from typing import Any
 
 import numpy as np
 from sysdyn.cli.failures import UsageError
-from sysdyn.cli.run.many.loaded import Loaded
-from sysdyn.cli.run.request.asked import Request
+from sysdyn.cli.run.many.reusable_model import Loaded
+from sysdyn.cli.run.request.run_request import RunRequest
 from sysdyn.cli.run.running import Ran, finding
 from sysdyn.cli.sweep.axes import CHOICES
-from sysdyn.cli.sweep.in_core import Cases, thin_instants
-from sysdyn.cli.sweep.kept import Item, Kept
+from sysdyn.cli.sweep.core_cases import Cases, thin_instants
+from sysdyn.cli.sweep.run_records import Item, Kept
 from sysdyn.cli.sweep.study import Case
 from sysdyn.dsl.text.diagnostics import ModelError, Report
 from sysdyn.runtime.many.asked import NotApplicableError
@@ -32,7 +32,7 @@ class Runner:
     """
 
     def __init__(
-        self, request: Request, keep: str = "traces", *, core: bool = True, loaded: Loaded | None = None
+        self, request: RunRequest, keep: str = "traces", *, core: bool = True, loaded: Loaded | None = None
     ) -> None:
         self.request, self.keep, self.core = replace(request, extrema=keep != "end"), keep, core
         loaded = None if loaded is None else loaded.keeping(extrema=keep != "end")
@@ -104,7 +104,7 @@ def _split_case(case: Case) -> tuple[tuple[tuple[str, str], ...], dict[str, Any]
     return choices, {name: value for name, value in case.items() if name not in names}
 
 
-def _chosen(request: Request, choices: tuple[tuple[str, str], ...]) -> Request:
+def _chosen(request: RunRequest, choices: tuple[tuple[str, str], ...]) -> RunRequest:
     """The request under choices."""
     changes: dict[str, Any] = {}
     levels = list(request.levels)

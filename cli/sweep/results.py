@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 from sysdyn.cli import whole_files
-from sysdyn.cli.sweep.kept import Done
+from sysdyn.cli.sweep.run_records import Done
 from sysdyn.cli.sweep.study import Case
 from sysdyn.names import trace_name
 

@@ -28,7 +28,7 @@ Case = dict[str, float | str]
 
 
 @dataclass(frozen=True, slots=True)
-class Study:
+class SweepStudy:
     """axes: what varies; sample, runs, seed: of what is drawn (runs 0: nothing is)."""
 
     axes: tuple[Axis, ...]
@@ -78,7 +78,7 @@ class Study:
         return hashlib.sha256(text.encode()).hexdigest()
 
 
-def study(axes: list[Axis], sample: str | None, runs: int | None, seed: int) -> Study:
+def study(axes: list[Axis], sample: str | None, runs: int | None, seed: int) -> SweepStudy:
     """A study; UsageError where its parts do not fit each other."""
     names = [axis.name for axis in axes]
     twice = next((n for n in names if names.count(n) > 1), None)
@@ -96,7 +96,7 @@ def study(axes: list[Axis], sample: str | None, runs: int | None, seed: int) -> 
         raise UsageError(f"--runs {runs}: from 1 to {MOST}")
     if not 0 <= seed <= LAST_SEED:
         raise UsageError(f"--seed {seed}: a whole number from 0 to {LAST_SEED}")
-    found = Study(tuple(axes), sample or "random", runs or 0, seed)
+    found = SweepStudy(tuple(axes), sample or "random", runs or 0, seed)
     if found.number > MOST:
         raise UsageError(f"{found.number} runs: at most {MOST}")
     return found

@@ -15,19 +15,19 @@ import numpy as np
 from sysdyn import __version__
 from sysdyn.cli.failures import plain
 from sysdyn.cli.run.request import lock
-from sysdyn.cli.run.request.asked import Request, instants_of, model_digest
+from sysdyn.cli.run.request.run_request import RunRequest, instants_of, model_digest
 from sysdyn.cli.run.request.targets import Target
 from sysdyn.cli.sweep import results
 from sysdyn.cli.sweep.axes import CHOICES, Axis, Evaluate, axis
-from sysdyn.cli.sweep.journal import Journal
-from sysdyn.cli.sweep.kept import Done, Item, Kept
+from sysdyn.cli.sweep.journal import SweepJournal
 from sysdyn.cli.sweep.one_run import Runner, Task
-from sysdyn.cli.sweep.study import Case, Study
+from sysdyn.cli.sweep.run_records import Done, Item, Kept
+from sysdyn.cli.sweep.study import Case, SweepStudy
 from sysdyn.cli.sweep.workers import results as worked
 from sysdyn.dsl import load
 from sysdyn.dsl.model import expression as ex
 from sysdyn.dsl.model.units import si_text
-from sysdyn.dsl.rules.asked import REFUSED
+from sysdyn.dsl.rules.text_conditions import REFUSED
 from sysdyn.dsl.text.diagnostics import ModelError, Report
 from sysdyn.runtime.trace.claim import claimed
 from sysdyn.runtime.trace.opening import destination
@@ -105,8 +105,8 @@ def _evaluate(runner: Runner) -> Evaluate:
 
 
 def sweep(
-    request: Request,
-    study: Study,
+    request: RunRequest,
+    study: SweepStudy,
     output: Path,
     jobs: int,
     progress: Progress,
@@ -131,7 +131,7 @@ def sweep(
     units, attributes = _units(runner, cases[0]), _attributes(target, study)
     place = destination(output)
     # one sweep at a time writes a file
-    with claimed(place), Journal(place, digest) as journal:
+    with claimed(place), SweepJournal(place, digest) as journal:
         resumed = len(journal.done)
         tasks = ((k, case) for k, case in enumerate(cases) if k not in journal.done)
         left = len(cases) - resumed
@@ -162,7 +162,7 @@ def sweep(
 
 
 def _items(
-    request: Request, tasks: Iterator[Task], left: int, jobs: int, keep: str, dask: str | None, runner: Runner
+    request: RunRequest, tasks: Iterator[Task], left: int, jobs: int, keep: str, dask: str | None, runner: Runner
 ) -> Iterator[Item]:
     """What is kept of the tasks, by whoever runs them."""
     if dask is None:
@@ -184,7 +184,7 @@ def _check_first(runner: Runner, case: Case) -> None:
     report.raise_if_failed()
 
 
-def _attributes(target: Target, study: Study) -> dict[str, Any]:
+def _attributes(target: Target, study: SweepStudy) -> dict[str, Any]:
     """Of the file of results: what was run, by what."""
     return {
         "Conventions": "CF-1.11",

@@ -17,9 +17,9 @@ from itertools import islice
 from multiprocessing.connection import Connection
 
 from sysdyn.cli.run.many.crew import DEATHS, Crew, Serve
-from sysdyn.cli.run.request.asked import Request
-from sysdyn.cli.sweep.kept import Item, Kept
+from sysdyn.cli.run.request.run_request import RunRequest
 from sysdyn.cli.sweep.one_run import Runner, Task
+from sysdyn.cli.sweep.run_records import Item, Kept
 from sysdyn.values import dataclass
 
 FIRST, LARGEST = 8, 1024
@@ -46,7 +46,7 @@ def answer(runner: Runner, chunk: Chunk) -> Answer:
     return runner.chunk(chunk.tasks)
 
 
-def serve(pipe: Connection, request: Request, keep: str) -> None:
+def serve(pipe: Connection, request: RunRequest, keep: str) -> None:
     """A worker: chunks from the pipe until it is closed."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # the one who steers ends it
     runner = Runner(request, keep)
@@ -98,7 +98,7 @@ class Queue:
 
 
 def results(
-    request: Request,
+    request: RunRequest,
     tasks: Iterable[Task],
     number: int,
     jobs: int,

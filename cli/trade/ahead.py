@@ -10,10 +10,10 @@ from collections.abc import Iterator, Sequence
 from pathlib import Path
 
 from sysdyn.cli.run.many.crew import Lost, as_ready
-from sysdyn.cli.run.request.asked import Request
+from sysdyn.cli.run.request.run_request import RunRequest
 from sysdyn.cli.trade.measuring import Limits, bench_of
-from sysdyn.cli.trade.search import FIRST, Search, tolerance
-from sysdyn.cli.trade.traded import Combination, Measured, Runs
+from sysdyn.cli.trade.search import FIRST, TradeSearch, tolerance
+from sysdyn.cli.trade.trade_results import Combination, Measured, Runs
 from sysdyn.runtime.trace.trace import Trace
 from sysdyn.values import dataclass
 
@@ -22,10 +22,10 @@ STEPS = 20_000
 
 
 @dataclass(frozen=True, slots=True)
-class Asked:
+class MeasurementRequest:
     """Runs of one combination.  reference, until [s]: what errors are taken from; wall [s]: of one run."""
 
-    request: Request
+    request: RunRequest
     folder: Path
     combination: Combination
     reference: Trace
@@ -34,7 +34,7 @@ class Asked:
     wall: float
 
 
-def _runs(asked: Asked) -> Runs:
+def _runs(asked: MeasurementRequest) -> Runs:
     """In a process of its own."""
     bench, found = bench_of(asked.request, asked.folder), Runs()
 
@@ -45,7 +45,7 @@ def _runs(asked: Asked) -> Runs:
         return made
 
     if asked.full:
-        Search(bench.accuracy, 0.0, measure).full([asked.combination])
+        TradeSearch(bench.accuracy, 0.0, measure).full([asked.combination])
     else:
         made = measure(asked.combination, tolerance(FIRST), 0.0)
         if isinstance(made, Measured) and made.error is None:
@@ -53,7 +53,7 @@ def _runs(asked: Asked) -> Runs:
     return found
 
 
-def ahead(asked: Sequence[Asked], jobs: int) -> Iterator[Runs]:
+def ahead(asked: Sequence[MeasurementRequest], jobs: int) -> Iterator[Runs]:
     """The runs of all combinations, as they are ready; what a process died of is left to the search."""
     for _, runs in as_ready(_runs, asked, jobs):
         if not isinstance(runs, Lost):

@@ -19,13 +19,13 @@ from sysdyn.cli.failures import OF_CLAIMS, UsageError
 from sysdyn.cli.options import TRIED
 from sysdyn.cli.run.prepare import Prepared
 from sysdyn.cli.run.request import targets
-from sysdyn.cli.run.request.asked import ACCURACY, Request, options_of
+from sysdyn.cli.run.request.run_request import ACCURACY, RunRequest, options_of
 from sysdyn.cli.run.request.targets import Target
 from sysdyn.cli.run.running import Ran, begin, finding, ready, run_from
 from sysdyn.cli.run.start.starting import Started
 from sysdyn.cli.trade import work
 from sysdyn.cli.trade.errors import error_of
-from sysdyn.cli.trade.traded import INDICES, Combination, Measured, Refusal
+from sysdyn.cli.trade.trade_results import INDICES, Combination, Measured, RefusedCombination
 from sysdyn.dsl.model import expression as ex
 from sysdyn.dsl.model.network import Network
 from sysdyn.dsl.text.diagnostics import Diagnostic, Report
@@ -89,10 +89,10 @@ class Bench:
     detail, which the reference has.
     """
 
-    def __init__(self, request: Request, target: Target, report: Report, folder: Path, began: float) -> None:
+    def __init__(self, request: RunRequest, target: Target, report: Report, folder: Path, began: float) -> None:
         self.request, self.target, self.report, self.folder, self.began = request, target, report, folder, began
         self.carried: dict[tuple[str, str], Carried] = {}
-        self.refusals: list[Refusal] = []
+        self.refusals: list[RefusedCombination] = []
         self.levels: dict[str, tuple[tuple[str, str], ...]] = {}
         self.names: list[str] = []
         self.missing: set[tuple[str, str]] = set()
@@ -119,7 +119,7 @@ class Bench:
                 continue
             if unknowns > LARGE:
                 why = f"the model has {unknowns} unknowns: only the formulation of the scene is measured"
-                self.refusals.append(Refusal(name, f"{why}; --formulation {name}"))
+                self.refusals.append(RefusedCombination(name, f"{why}; --formulation {name}"))
             elif self._carry(Carrying(name, first[1], self.levels[first[1]]), Report()):
                 self.names.append(name)
         # other levels; the one of the most detail is the full model
@@ -149,7 +149,9 @@ class Bench:
             reasons = [d for d in report if d.severity == "error"] or list(report)
             if what.formulation is not None and reasons:
                 said = reasons[0]
-                self.refusals.append(Refusal(what.formulation, said.message, said.to_json(), level=what.level))
+                self.refusals.append(
+                    RefusedCombination(what.formulation, said.message, said.to_json(), level=what.level)
+                )
             return None
         sampled = any(event.period is not None for event in prepared.network.events)
         every = None if sampled else options.every  # rows of its own may all be at samples, where nothing is compared
@@ -353,10 +355,10 @@ def _reason(ran: Ran | None, report: Report) -> str:
     return errors[0] if errors else "not met"
 
 
-_benches: dict[tuple[Request, Path], Bench] = {}
+_benches: dict[tuple[RunRequest, Path], Bench] = {}
 
 
-def bench_of(request: Request, folder: Path) -> Bench:
+def bench_of(request: RunRequest, folder: Path) -> Bench:
     """The settings of a request's scene in a process beside the one that asks, made once."""
     key = request, folder
     if key not in _benches:

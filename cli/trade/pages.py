@@ -18,7 +18,7 @@ from sysdyn.cli.page.document import document, escape, table
 from sysdyn.cli.page.panels import COLOURS
 from sysdyn.cli.page.picture import drawing
 from sysdyn.cli.page.plots import SCRIPT, hint
-from sysdyn.cli.trade.traded import Combination, Measured, Traded
+from sysdyn.cli.trade.trade_results import Combination, Measured, Traded
 
 MARKERS = {"dopri": "o", "radau": "s", "bdf": "^", "rosenbrock": "D"}
 STROKES: dict[str, Any] = {"2": "-", "3": ":", "2v": "-.", "1": "--", "0": (0, (1, 1))}

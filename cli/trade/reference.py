@@ -13,10 +13,10 @@ from contextlib import closing
 from pathlib import Path
 
 from sysdyn.cli.run.many.crew import Beside
-from sysdyn.cli.run.request.asked import Request
+from sysdyn.cli.run.request.run_request import RunRequest
 from sysdyn.cli.trade.errors import error_of
 from sysdyn.cli.trade.measuring import Bench, Limits, Said, bench_of
-from sysdyn.cli.trade.traded import Combination, Reference
+from sysdyn.cli.trade.trade_results import Combination, TradeReference
 from sysdyn.cli.verify.agreement import horizon
 from sysdyn.runtime.accuracy.laws import LAWS
 from sysdyn.runtime.trace.trace import Trace
@@ -56,7 +56,7 @@ class NoReference(Exception):  # noqa: N818 (a name of the house)
         super().__init__(message)
 
 
-def reference(bench: Bench, budget: float | None, jobs: int | None = 1) -> tuple[Trace, Reference]:
+def reference(bench: Bench, budget: float | None, jobs: int | None = 1) -> tuple[Trace, TradeReference]:
     """The reference's trace and what is known of it.  budget [s] of wall time.  Raises NoReference.
 
     jobs: 1: one run after the other; else the second way runs beside the first, once that has been long.
@@ -100,7 +100,7 @@ def reference(bench: Bench, budget: float | None, jobs: int | None = 1) -> tuple
             raise NoReference(f"{text}: too much for an accuracy of {bench.accuracy:.0e}")
         judged = bench.judged_quantities(first.trace)
         uncertainty = error_of(second.trace, first.trace, judged, bench.accuracy, until)
-    return first.trace, Reference(first.name, second.name, uncertainty, until)
+    return first.trace, TradeReference(first.name, second.name, uncertainty, until)
 
 
 def _ways(bench: Bench) -> Iterator[Combination]:
@@ -114,7 +114,7 @@ def _ways(bench: Bench) -> Iterator[Combination]:
         yield Combination(names[0], "2", "radau", level)
 
 
-def _run_finest(asked: tuple[Request, Path, Combination, float | None]) -> _Tried:
+def _run_finest(asked: tuple[RunRequest, Path, Combination, float | None]) -> _Tried:
     """A run at the finest tolerance in a process of its own."""
     request, folder, combination, budget = asked
     return _finest(bench_of(request, folder), combination, budget, 1)

@@ -13,7 +13,7 @@ import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 
-from sysdyn.cli.trade.traded import Combination, Measured, cheapest, meets
+from sysdyn.cli.trade.trade_results import Combination, Measured, cheapest, meets
 
 LOOSEST, FIRST, TIGHTEST = 2, 4, 24
 """Numbers of the tolerances 1e-1, 1e-2, 1e-12."""
@@ -57,7 +57,7 @@ class Climb:
 
 
 @dataclass(slots=True)
-class Search:
+class TradeSearch:
     """The measurements of one scene.  limit: monotonic instant at which it ends, None: none; flat: levels whose errors
     no tolerance changes any more.
     """

@@ -13,14 +13,14 @@ from pathlib import Path
 from sysdyn.cli.failures import UsageError
 from sysdyn.cli.run.many.crew import company
 from sysdyn.cli.run.request import targets
-from sysdyn.cli.run.request.asked import Request, check_tolerances
+from sysdyn.cli.run.request.run_request import RunRequest, check_tolerances
 from sysdyn.cli.trade import work
-from sysdyn.cli.trade.ahead import Asked, ahead
-from sysdyn.cli.trade.journal import journal as journal_of
+from sysdyn.cli.trade.ahead import MeasurementRequest, ahead
 from sysdyn.cli.trade.measuring import Bench, Limits
 from sysdyn.cli.trade.reference import reference
-from sysdyn.cli.trade.search import FIRST, Search, tolerance
-from sysdyn.cli.trade.traded import Combination, Measured, Refusal, Runs, Traded
+from sysdyn.cli.trade.search import FIRST, TradeSearch, tolerance
+from sysdyn.cli.trade.trade_journal import journal as journal_of
+from sysdyn.cli.trade.trade_results import Combination, Measured, RefusedCombination, Runs, Traded
 from sysdyn.dsl.text.diagnostics import Report
 
 SECONDS = 300.0
@@ -30,7 +30,7 @@ LEAST = 40
 """Steps that every run may take: the longest is a twentieth of the span."""
 
 
-def _check_request(request: Request) -> None:
+def _check_request(request: RunRequest) -> None:
     """UsageError where what a trade chooses is said already."""
     check_tolerances(request)
     if request.rtol is not None or request.atol is not None:
@@ -40,7 +40,7 @@ def _check_request(request: Request) -> None:
 
 
 def trade(
-    request: Request,
+    request: RunRequest,
     report: Report,
     folder: Path,
     *,
@@ -51,7 +51,7 @@ def trade(
 ) -> Traded | None:
     """Measure; None where the report says why the scene cannot run.  Raises NoReference.
 
-    A trade that was stopped goes on where it was (journal.py).
+    A trade that was stopped goes on where it was (trade_journal.py).
     full: every combination at every tolerance; budget [s] of wall time for all; jobs: processes that make runs ahead;
     None: where it pays, which it does not where the search leaves most combinations out.
     """
@@ -82,7 +82,7 @@ def trade(
     # runs ahead pay where all combinations are measured
     number = jobs or (company(first) if full else 1)
     if number > 1:
-        asked = [Asked(request, folder, c, kept, known.until, full, wall()) for c in left]
+        asked = [MeasurementRequest(request, folder, c, kept, known.until, full, wall()) for c in left]
         for runs in ahead(asked, number):
             for (combination, at), found in runs.items():
                 if made_before.setdefault((combination, at), found) is found and journal is not None:
@@ -101,7 +101,7 @@ def trade(
         return made
 
     # one of two orders: everything, or the cheapest first
-    search = Search(bench.accuracy, known.uncertainty, measure, limit, progress)
+    search = TradeSearch(bench.accuracy, known.uncertainty, measure, limit, progress)
     (search.full if full else search.thrifty)(combinations)
     if journal is not None and search.ended:
         journal.remove()
@@ -118,7 +118,7 @@ def trade(
     )
 
 
-def _never(search: Search) -> list[Refusal]:
+def _never(search: TradeSearch) -> list[RefusedCombination]:
     """Combinations that do not exist."""
     refused = [(climb.combination, climb.refused) for climb in search.climbs if climb.refused]
-    return [Refusal(c.formulation, reason, None, c.index, c.method, c.level) for c, reason in refused]
+    return [RefusedCombination(c.formulation, reason, None, c.index, c.method, c.level) for c, reason in refused]

@@ -21,12 +21,12 @@ from sysdyn.cli.options import EVERY
 from sysdyn.cli.run.many.crew import Lost, each
 from sysdyn.cli.run.prepare import Prepared
 from sysdyn.cli.run.request import targets
-from sysdyn.cli.run.request.asked import ACCURACY, Request, check_tolerances, options_of
+from sysdyn.cli.run.request.run_request import ACCURACY, RunRequest, check_tolerances, options_of
 from sysdyn.cli.run.request.targets import Target
 from sysdyn.cli.run.running import Ran, finding, integrate, ready
 from sysdyn.cli.verify.agreement import Bounds, Gap, gaps, horizon
 from sysdyn.cli.verify.twins import Twins, free_quantities, twins
-from sysdyn.cli.verify.verified import Refusal, Run, Verified, disagreements, worst
+from sysdyn.cli.verify.verify_results import RefusedFormulation, Verified, VerifiedRun, disagreements, worst
 from sysdyn.dsl.model import expression as ex
 from sysdyn.dsl.text.diagnostics import Diagnostic, Report
 from sysdyn.runtime.accuracy.options import Options
@@ -49,7 +49,7 @@ JUDGED = (*OF_CLAIMS, *OF_RUNS)
 
 
 def verify(
-    request: Request,
+    request: RunRequest,
     report: Report,
     folder: Path | None,
     progress: Callable[[float, float | None], None] | None = None,
@@ -72,18 +72,18 @@ def verify(
 class _Part:
     """What came of one formulation; said: findings of the reference."""
 
-    runs: tuple[Run, ...]
-    refusals: tuple[Refusal, ...]
+    runs: tuple[VerifiedRun, ...]
+    refusals: tuple[RefusedFormulation, ...]
     twins: tuple[Twins, ...]
     left_out: dict[str, str]
     found: dict[tuple[str, object], tuple[Diagnostic, list[str]]]
     bounds: dict[str, float]
     span: tuple[float, float]
-    finer: Run | None
+    finer: VerifiedRun | None
     said: tuple[Diagnostic, ...]
 
 
-def _part(asked: tuple[Request, Path | None, str | None]) -> _Part:
+def _part(asked: tuple[RunRequest, Path | None, str | None]) -> _Part:
     """One formulation (None: the reference) in a process of its own."""
     request, folder, name = asked
     report = Report()
@@ -105,7 +105,7 @@ class _Verification:
 
     def __init__(
         self,
-        request: Request,
+        request: RunRequest,
         target: Target,
         report: Report,
         folder: Path | None,
@@ -114,14 +114,14 @@ class _Verification:
         self.request, self.target, self.report, self.folder, self._progress = request, target, report, folder, progress
         self.began = time.monotonic()
         self.done, self.planned = 0, 2 * len(EVERY) + 1
-        self.runs: list[Run] = []
-        self.refusals: list[Refusal] = []
+        self.runs: list[VerifiedRun] = []
+        self.refusals: list[RefusedFormulation] = []
         self.twins: list[Twins] = []
         self.left_out: dict[str, str] = {}
         self.found: dict[tuple[str, object], tuple[Diagnostic, list[str]]] = {}
         self.bounds: dict[str, float] = {}
         self.span = (0.0, 0.0)
-        self.finer: Run | None = None
+        self.finer: VerifiedRun | None = None
         self.interrupted = False
 
     def all(self, jobs: int | None = 1) -> Verified | None:
@@ -165,7 +165,7 @@ class _Verification:
         assert self.finer is not None
         return self._compare_runs(self.finer)
 
-    def _here(self, item: tuple[Request, Path | None, str | None]) -> None:
+    def _here(self, item: tuple[RunRequest, Path | None, str | None]) -> None:
         """A formulation in this process."""
         self._formulation(item[2])
 
@@ -239,7 +239,7 @@ class _Verification:
                 self.finer = self._other(prepared, options, self.runs[0])
                 self.done += 1
 
-    def _other(self, prepared: Prepared, options: Options, reference: Run) -> Run | None:
+    def _other(self, prepared: Prepared, options: Options, reference: VerifiedRun) -> VerifiedRun | None:
         """The reference at a tenth of the accuracy; at a coarser tolerance where it has the finest there is already."""
         finer, report = _finer(options), Report()
         ran = self._run(prepared, finer, reference.method, report, "-finer")
@@ -291,7 +291,7 @@ class _Verification:
 
     # --- comparison ---------------------------------------------------------------------------------------------
 
-    def _compare_runs(self, finer: Run) -> Verified:
+    def _compare_runs(self, finer: VerifiedRun) -> Verified:
         """Compare all runs up to the horizon of the reference, or of a run that loses its accuracy earlier."""
         reference = self.runs[0]
         # quantities without a bound, or missing somewhere, are named
@@ -329,9 +329,9 @@ class _Verification:
             self.interrupted,
         )
 
-    def _starts(self, bounds: dict[str, float]) -> tuple[tuple[Run, Gap], ...]:
+    def _starts(self, bounds: dict[str, float]) -> tuple[tuple[VerifiedRun, Gap], ...]:
         """One run of each other formulation, and its worst gap to the reference at the first instant."""
-        reference, begun = self.runs[0], dict[str, tuple[Run, Gap]]()
+        reference, begun = self.runs[0], dict[str, tuple[VerifiedRun, Gap]]()
         for run in self.runs:
             if run.formulation != reference.formulation and run.formulation not in begun:
                 for gap in gaps(reference.trace, run.trace, bounds, self.span[0])[:1]:
@@ -349,13 +349,13 @@ class _Verification:
         return (math.inf, None) if other is None else horizon(run.trace, other.trace, bounds)
 
 
-def _refusal(formulation: str, report: Report) -> Refusal | None:
+def _refusal(formulation: str, report: Report) -> RefusedFormulation | None:
     """Why a formulation cannot express the model; None where something else is wrong."""
     if any(d.severity == "error" and d.code not in REFUSALS for d in report):
         return None
     reasons = [d for d in report if d.code in REFUSALS]
     reasons.sort(key=lambda d: d.severity != "error")
-    return Refusal(formulation, reasons[0].code, reasons[0].message) if reasons else None
+    return RefusedFormulation(formulation, reasons[0].code, reasons[0].message) if reasons else None
 
 
 def _on_grid(options: Options) -> Options:
@@ -390,9 +390,11 @@ def _bounds(options: Options, trace: Trace) -> dict[str, float]:
     return {name: TIMES * wanted.get(name, rest) for name in trace.names}
 
 
-def _read(ran: Ran, options: Options, report: Report) -> Run:
+def _read(ran: Ran, options: Options, report: Report) -> VerifiedRun:
     accuracy = min([options.accuracy or ACCURACY, *(wanted for _, wanted in options.accuracy_on)])
     claims = tuple((claim.text, claim.ok) for claim in ran.claims)
     trace = ran.outcome.traced
     said = finding(report) if ran.failure else None
-    return Run(ran.prepared.formulation, ran.outcome.method, accuracy, ran.outcome, claims, trace, ran.failure, said)
+    return VerifiedRun(
+        ran.prepared.formulation, ran.outcome.method, accuracy, ran.outcome, claims, trace, ran.failure, said
+    )

@@ -11,7 +11,7 @@ from collections.abc import Iterator
 from sysdyn.compiler.forms.momenta import coordinates_by_energy, inertial, undefined_momenta
 from sysdyn.compiler.model.energies import EnergyModel, tangible
 from sysdyn.compiler.model.integers import Integers
-from sysdyn.compiler.network.primal.bounds import Sizes
+from sysdyn.compiler.network.primal.bounds import WholeNumbers
 from sysdyn.dsl.model.affine import AFFINE
 from sysdyn.dsl.model.expression import Node, topological, variables
 from sysdyn.dsl.model.network import Network
@@ -23,7 +23,7 @@ def check_energies(model: EnergyModel, network: Network) -> tuple[Diagnostic, ..
     return (
         *_idle_efforts(model),
         *_assertions(model, network),
-        *_find_undetermined(model, Sizes(network)),
+        *_find_undetermined(model, WholeNumbers(network)),
         *_missing_momenta(model),
         *_indices(model),
     )
@@ -52,7 +52,7 @@ def _assertions(model: EnergyModel, network: Network) -> Iterator[Diagnostic]:
             yield Diagnostic("E513", message, c.place, "delete 'tangible'")
 
 
-def _find_undetermined(model: EnergyModel, sizes: Sizes) -> Iterator[Diagnostic]:
+def _find_undetermined(model: EnergyModel, sizes: WholeNumbers) -> Iterator[Diagnostic]:
     """E516: no store, dissipator, constraint or law contains the coordinate, and there is one (no empty range)."""
     roots = [t.expression for name in model.functions for t in model.function(name)]
     roots += _of_rows(model, ("phi", "psi", "gamma")) + [w.effort for w in model.works]

@@ -1,8 +1,8 @@
 """Bindings of many runs at once: scalar parameters as columns over the runs, evaluated together.
 
 What varies must be numbers alone: scalars that no array, shape, whole number or index follows from.  Received: a
-binding of the text's own values and columns of overrides; returned: `Columns`, or None where a run needs its own.
-The numbers are those that `bind` gives each run, bit for bit (a caller that doubts it compares single runs).
+binding of the text's own values and columns of overrides; returned: `ParameterColumns`, or None where a run needs its
+own.  The numbers are those that `bind` gives each run, bit for bit (a caller that doubts it compares single runs).
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ Floats = NDArray[np.float64]
 
 
 @dataclass(frozen=True, slots=True)
-class Columns:
+class ParameterColumns:
     """p [runs, parameters]; starts: (statement of the binding, values [runs]) of those that vary; good [runs]: the
     values make sense, as far as it was looked at here.
     """
@@ -118,7 +118,7 @@ def columns(
     program: Program,
     binding: Binding,
     varied: Mapping[str, Floats],
-) -> Columns | None:
+) -> ParameterColumns | None:
     """The numbers of runs whose scalar parameters are `varied` [runs]; None where they need bindings of their own."""
     known = {p.name: p for p in network.parameters}
     # constants of integrated rows need a binding each
@@ -164,7 +164,7 @@ def columns(
     for place, name in enumerate(program.scalars):
         if name in moving:
             p[:, place] = values.values[name]
-    return Columns(p, tuple(starts), good)
+    return ParameterColumns(p, tuple(starts), good)
 
 
 def _over(node: Node, values: Parameters, runs: int) -> Floats:

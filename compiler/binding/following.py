@@ -26,7 +26,7 @@ Places = NDArray[np.int64]
 
 
 @dataclass(frozen=True, slots=True)
-class Group:
+class FormulaGroup:
     """The formulas of one block, evaluated together.
 
     kind: parameter (values stand in p), initial (in families of unknowns), constant (added up in p); entries: number of
@@ -50,7 +50,7 @@ class Following:
 
     program: Program
     ix: NDArray[np.int32]
-    groups: tuple[Group, ...]
+    groups: tuple[FormulaGroup, ...]
     follows: dict[str, tuple[str, ...]]
     structural: tuple[str, ...]
 
@@ -107,9 +107,9 @@ def _structural(network: Network, follows: dict[str, tuple[str, ...]]) -> tuple[
     return tuple(found)
 
 
-def _group(name: str, pieces: list[_Piece]) -> Group:
+def _group(name: str, pieces: list[_Piece]) -> FormulaGroup:
     first = np.cumsum([0, *(p.number for p in pieces)])
-    return Group(
+    return FormulaGroup(
         name,
         pieces[0].kind,
         int(first[-1]),

@@ -8,7 +8,7 @@ densely, between the instants of what stands inside it, until the number of chan
 neighbouring doubles, evaluated by the operations that the generated code does, so that the instant is the very double
 at which the text changes; where round-off turns it to and fro around there, the first and the last of these are given.
 
-Received: a descriptor form and a binding; returned: `Instants`.
+Received: a descriptor form and a binding; returned: `TextInstants`.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ from dataclasses import replace
 
 import numpy as np
 from sysdyn.compiler.binding.binding import Binding
-from sysdyn.compiler.binding.labels import Array, Label, Labels, Watched, Whole
+from sysdyn.compiler.binding.labels import Array, Label, Labels, TimedOperation, Whole
 from sysdyn.compiler.forms.descriptor import WITHOUT_ENTRIES, DescriptorForm
 from sysdyn.compiler.model.interpret import grid
 from sysdyn.compiler.model.parameters import Parameters
@@ -42,7 +42,7 @@ LAST = 1e-12
 
 
 @dataclass(frozen=True, slots=True)
-class Instants:
+class TextInstants:
     """times [s], ascending; note: a sentence where the text has instants that are not among them."""
 
     times: Array
@@ -62,13 +62,13 @@ def instants(
     read: Sequence[Node] = (),
     crossed: Sequence[Node] = (),
     closed: Sequence[Node] = (),
-) -> Instants:
+) -> TextInstants:
     """All instants in (t0, t1], and t0 where the text jumps behind it; tables: of the network; read: what events read;
     crossed: whose zeros are events, which no step may pass over twice; closed: those of them that happen at the zero
     itself (`t >= T`), so that one at t1, which no step crosses, is an instant.  None of them, with a note, where they
     are more than MOST.
     """
-    search = _Search(binding.parameters, t0, t1)
+    search = _InstantSearch(binding.parameters, t0, t1)
     try:
         # jumps and kinks of what is integrated and of what events read
         for watched in _watched_operations(form, {t.name: t for t in tables}, read):
@@ -82,13 +82,13 @@ def instants(
             times = distinct(times, np.array([t1]))
     except _TooManyError:
         text = f"the text jumps or has kinks at more than {MOST} instants: they are integrated through"
-        return Instants(np.zeros(0), text)
-    return Instants(times, search.note)
+        return TextInstants(np.zeros(0), text)
+    return TextInstants(times, search.note)
 
 
 def turns(binding: Binding, t0: float, t1: float, slope: Node) -> Array:
     """Instants (s) in (t0, t1], ascending, at which an expression of time alone passes zero; none beyond MOST."""
-    search = _Search(binding.parameters, t0, t1)
+    search = _InstantSearch(binding.parameters, t0, t1)
     try:
         search.add(_zeros(slope, (slope,)))
         return search.times()
@@ -100,7 +100,7 @@ def changes(
     parameters: Parameters, span: tuple[float, float], root: Node, nest: Nest, tables: Mapping[str, Table]
 ) -> Array:
     """Instants (s) of a span, ascending, at which an operation of time alone in it changes; none beyond MOST."""
-    search = _Search(parameters, *span)
+    search = _InstantSearch(parameters, *span)
     try:
         for node in topological_unbound([root]):
             for watched in _watches_of(node, dict(tables)):
@@ -112,19 +112,21 @@ def changes(
 
 def _ends(parameters: Parameters, t0: float, t1: float, closed: Sequence[Node]) -> bool:
     """Whether one of some expressions, of time alone, passes zero at t1, but for round-off."""
-    search = _Search(parameters, t1 - LAST * (t1 - t0), t1 + ROUND_OFF * max(abs(t0), abs(t1)))
+    search = _InstantSearch(parameters, t1 - LAST * (t1 - t0), t1 + ROUND_OFF * max(abs(t0), abs(t1)))
     for node in closed:
         if _in_time_alone(node):
             search.add(_zeros(node, (node,)))
     return bool(search.times().size)
 
 
-def _zeros(node: Node, arguments: tuple[Node, ...]) -> Watched:
+def _zeros(node: Node, arguments: tuple[Node, ...]) -> TimedOperation:
     """The zeros of its one argument."""
-    return Watched(node, arguments, lambda v: np.sign(v[0]), np.zeros(1), ())
+    return TimedOperation(node, arguments, lambda v: np.sign(v[0]), np.zeros(1), ())
 
 
-def _watched_operations(form: DescriptorForm, tables: dict[str, Table], read: Sequence[Node]) -> Iterator[Watched]:
+def _watched_operations(
+    form: DescriptorForm, tables: dict[str, Table], read: Sequence[Node]
+) -> Iterator[TimedOperation]:
     """Operations of all rows that are integrated, and of what events read, those inside others first."""
     stack: list[tuple[Node, Nest]] = [(node, ()) for node in read]
     for block in form.blocks:
@@ -141,11 +143,11 @@ def _watched_operations(form: DescriptorForm, tables: dict[str, Table], read: Se
             for watched in _watches_of(node, tables):
                 kept = _trim_nest(watched.arguments, nest)
                 if (node, kept) not in seen:
-                    yield Watched(node, watched.arguments, watched.label, watched.levels, kept)
+                    yield TimedOperation(node, watched.arguments, watched.label, watched.levels, kept)
             seen.add((node, _trim_nest(node.args, nest)))
 
 
-def _watches_of(node: Node, tables: dict[str, Table]) -> Iterator[Watched]:
+def _watches_of(node: Node, tables: dict[str, Table]) -> Iterator[TimedOperation]:
     """What is watched of a node; nothing where it does not depend on time alone."""
     if not any(_in_time_alone(a) for a in node.args):
         return
@@ -156,22 +158,22 @@ def _watches_of(node: Node, tables: dict[str, Table]) -> Iterator[Watched]:
             if table is not None and _in_time_alone(argument):
                 at = np.asarray(points, dtype=float)
                 at = at[[0, -1]] if table.method == "cubic" else at  # a spline is smooth enough inside
-                yield Watched(node, (argument,), _piece(at), at, ())
+                yield TimedOperation(node, (argument,), _piece(at), at, ())
         return
     if not all(_in_time_alone(a) or not variables(a) for a in node.args):
         return
     # where two sides are equal
     if node.op == "cmp" or (node.op == "call" and node.data in ("min", "max")):
-        yield Watched(node, node.args, lambda v: np.sign(v[0] - v[1]), np.zeros(1), ())
+        yield TimedOperation(node, node.args, lambda v: np.sign(v[0] - v[1]), np.zeros(1), ())
     elif node.op == "call" and node.data in ("step", "abs", "sign"):
         yield _zeros(node, node.args)
     # at whole numbers
     elif node.op == "call" and node.data in ("floor", "ceil"):
         rounded = np.floor if node.data == "floor" else np.ceil
-        yield Watched(node, node.args, lambda v: np.asarray(rounded(v[0])), None, ())
+        yield TimedOperation(node, node.args, lambda v: np.asarray(rounded(v[0])), None, ())
     # at whole quotients
     elif node.op == "call" and node.data == "mod":
-        yield Watched(node, node.args, lambda v: np.floor(v[0] / v[1]), None, ())
+        yield TimedOperation(node, node.args, lambda v: np.floor(v[0] / v[1]), None, ())
 
 
 def _piece(points: Array) -> Label:
@@ -221,7 +223,7 @@ def distinct(*found: Array) -> Array:
     return every[first]
 
 
-class _Search:
+class _InstantSearch:
     """Collects instants of one binding in (t0, t1)."""
 
     def __init__(self, parameters: Parameters, t0: float, t1: float) -> None:
@@ -237,7 +239,7 @@ class _Search:
             raise _TooManyError
         return every
 
-    def add(self, watched: Watched) -> None:
+    def add(self, watched: TimedOperation) -> None:
         """The instants of one operation."""
         columns = grid(watched.nest, self._parameters.lookup)
         number = len(next(iter(columns.values()))) if columns else 1
@@ -265,7 +267,7 @@ class _Search:
         self._found[watched.node] = distinct(before, found)
         self.times()
 
-    def _affine(self, watched: Watched, labels: Labels, number: int) -> tuple[Whole, Array, Array] | None:
+    def _affine(self, watched: TimedOperation, labels: Labels, number: int) -> tuple[Whole, Array, Array] | None:
         """Brackets around the computed crossings; None where the argument is not affine."""
         arguments = watched.arguments
         whole = watched.levels is None and watched.node.data == "mod"
@@ -305,7 +307,7 @@ class _Search:
         around = 1e-12 * np.maximum(max(abs(self.t0), abs(self.t1)), np.abs(t))
         return index, np.maximum(t - around, self.t0), np.minimum(t + around, self.t1)
 
-    def _bracket_changes(self, watched: Watched, labels: Labels, number: int) -> tuple[Whole, Array, Array]:
+    def _bracket_changes(self, watched: TimedOperation, labels: Labels, number: int) -> tuple[Whole, Array, Array]:
         """Brackets between neighbouring samples of different labels, on pieces smooth inside."""
         inside = [self._found[n] for n in topological(watched.arguments) if n in self._found]
         edges = distinct(np.array([self.t0, self.t1]), *inside)

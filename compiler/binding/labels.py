@@ -34,7 +34,7 @@ _HALVINGS = 1100
 
 
 @dataclass(frozen=True, slots=True)
-class Watched:
+class TimedOperation:
     """An operation that changes in time alone: its arguments, its label, and where the label of an affine argument
     changes: levels of the argument (None: at whole numbers).
     """
@@ -49,7 +49,7 @@ class Watched:
 class Labels:
     """The label of one operation at any iteration and time."""
 
-    def __init__(self, watched: Watched, columns: dict[str, Array], lookup: Callable[..., Value]) -> None:
+    def __init__(self, watched: TimedOperation, columns: dict[str, Array], lookup: Callable[..., Value]) -> None:
         self._watched, self._columns, self._lookup = watched, columns, lookup
 
     def _values(self, index: Whole, t: Array, nodes: tuple[Node, ...] | None = None) -> list[Array]:

@@ -10,13 +10,13 @@ import re
 from typing import Any
 
 from sysdyn.compiler.binding.binding import Binding
-from sysdyn.compiler.forms.descriptor import BESIDE, DescriptorForm, Equations, Unknowns
+from sysdyn.compiler.forms.descriptor import BESIDE, DescriptorForm, EquationFamily, Unknowns
 from sysdyn.compiler.formulations import COMPLEMENTARY
-from sysdyn.compiler.model.integers import Index, Reference
+from sysdyn.compiler.model.integers import FamilyReference, Index
 from sysdyn.compiler.model.mirror import family_name, letter
 from sysdyn.compiler.model.parameters import Extents
 from sysdyn.compiler.network.authors import Authors, owner
-from sysdyn.compiler.program.program import Pattern, Program
+from sysdyn.compiler.program.program import KernelPattern, Program
 from sysdyn.dsl.model.network import Network
 from sysdyn.dsl.model.units import Unit
 from sysdyn.dsl.text.diagnostics import Place
@@ -48,7 +48,7 @@ def _family(family: Unknowns) -> dict[str, Any]:
     return {**plain, "nominal": None, **where(family.place)}
 
 
-def _row(row: Equations) -> dict[str, Any]:
+def _row(row: EquationFamily) -> dict[str, Any]:
     found = {"block": row.block, "label": row.label, "owner": row.owner, "kind": row.kind, **where(row.place)}
     found |= {"unit": row.unit, "rate": row.rate}
     if row.block == "observe":
@@ -63,7 +63,7 @@ def where(place: Place | None) -> dict[str, Any]:
     return {"file": place.file if place else None, "line": place.start[0] if place else None}
 
 
-def _kernel(pattern: Pattern) -> dict[str, Any]:
+def _kernel(pattern: KernelPattern) -> dict[str, Any]:
     """Entry of a kernel: loops, rows, entries of both Jacobians, and what its values read."""
     return {
         "loops": [[_bound(a), _bound(b)] for a, b in pattern.loops],
@@ -82,7 +82,7 @@ def _bound(index: Index) -> int | list[int]:
     return [index.loop, index.slot, index.constant] if index.loop >= 0 else index.slot
 
 
-def _reference(place: Reference) -> list[Any]:
+def _reference(place: FamilyReference) -> list[Any]:
     return [place.family, [i.as_list() for i in place.indices]]
 
 

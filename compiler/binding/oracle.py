@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 from sysdyn.compiler.binding.binding import Binding
 from sysdyn.compiler.binding.places import starts
-from sysdyn.compiler.forms.descriptor import DescriptorForm, Kernel
+from sysdyn.compiler.forms.descriptor import DescriptorForm, LoopKernel
 from sysdyn.compiler.model.interpret import Value, over
 from sysdyn.compiler.model.parameters import Extents, positions
 from sysdyn.compiler.model.terms import has_reduction
@@ -111,7 +111,7 @@ class Oracle:
         v, rows, columns = (np.concatenate(p) for p in zip(*found, strict=True))
         return v, rows, columns
 
-    def _entry(self, kernel: Kernel, k: int, column: Node, point: Point) -> tuple[Array, Array, Array]:
+    def _entry(self, kernel: LoopKernel, k: int, column: Node, point: Point) -> tuple[Array, Array, Array]:
         """One entry of a Jacobian over a kernel's iterations: values, rows and columns."""
         summand = kernel.rows[k]
         family = self._families[column.data[0], column.data[1]]
@@ -124,7 +124,7 @@ class Oracle:
         shape = values.shape
         return values, np.broadcast_to(row, shape).astype(float), np.broadcast_to(place, shape).astype(float)
 
-    def _written_out(self, kernel: Kernel) -> Kernel:
+    def _written_out(self, kernel: LoopKernel) -> LoopKernel:
         """The kernel with each min, max and product over a range written out: only of sums there are slopes."""
         rows = tuple(replace(s, expression=self._elements(s.expression)) for s in kernel.rows)
         return kernel if rows == kernel.rows else replace(kernel, rows=rows)
@@ -146,7 +146,7 @@ class Oracle:
             done[node] = combine_terms(node.data[0], parts)
         return done[root]
 
-    def _kernels(self, name: str) -> tuple[Kernel, ...]:
+    def _kernels(self, name: str) -> tuple[LoopKernel, ...]:
         block = self.form.block(name)
         return block.kernels if block is not None else ()
 
@@ -177,7 +177,7 @@ class Oracle:
         return self.binding.parameters.lookup(node, args)
 
 
-def _columns(kernel: Kernel, order: int) -> list[tuple[int, Node]]:
+def _columns(kernel: LoopKernel, order: int) -> list[tuple[int, Node]]:
     found = []
     for k, summand in enumerate(kernel.rows):
         nodes = (n for n in variables(summand.expression) if n.op == "var" and n.data[2] == order)

@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 from sysdyn.compiler.binding.binding import Binding
-from sysdyn.compiler.model.integers import Index, Reference
+from sysdyn.compiler.model.integers import FamilyReference, Index
 from sysdyn.compiler.model.parameters import Extents, extents, positions
-from sysdyn.compiler.program.program import Pattern, Program
+from sysdyn.compiler.program.program import KernelPattern, Program
 
 Whole = NDArray[np.int64]
 
@@ -18,7 +18,7 @@ def starts(shapes: tuple[Extents, ...]) -> NDArray[np.int32]:
     return np.concatenate(([0], np.cumsum(sizes))).astype(np.int32)
 
 
-def iterations(pattern: Pattern, ix: NDArray[np.int32]) -> list[Whole]:
+def iterations(pattern: KernelPattern, ix: NDArray[np.int32]) -> list[Whole]:
     """Values of each loop variable, last loop fastest; without loops an empty list."""
     columns: list[Whole] = []
     for first, last in pattern.loops:
@@ -37,7 +37,7 @@ def _value(index: Index, columns: list[Whole], ix: NDArray[np.int32]) -> Whole:
     return value if index.table < 0 else ix[ix[index.table] + value].astype(np.int64)
 
 
-def where(place: Reference, box: Extents, columns: list[Whole], ix: NDArray[np.int32]) -> Whole:
+def where(place: FamilyReference, box: Extents, columns: list[Whole], ix: NDArray[np.int32]) -> Whole:
     """Positions of a reference in its family, one an iteration."""
     size = len(columns[0]) if columns else 1
     if not place.indices:

@@ -26,7 +26,7 @@ import numpy as np
 from numpy.typing import NDArray
 from sysdyn.compiler.binding.binding import Binding
 from sysdyn.compiler.binding.oracle import Oracle
-from sysdyn.compiler.forms.descriptor import Block, DescriptorForm, Kernel
+from sysdyn.compiler.forms.descriptor import Block, DescriptorForm, LoopKernel
 from sysdyn.dsl.model.calculus import differential, rate_name
 from sysdyn.dsl.model.expression import Node, compare, conditional, const, index, is_const, substitute, topological
 from sysdyn.dsl.model.network import Network
@@ -44,7 +44,7 @@ RATES = {
 FIRST, LAST = -1, 2
 """Orders of slopes: by the integral of the parameter, by itself, by its first and second rate."""
 _DERIVED = (*RATES, "phi_acceleration", "gamma_acceleration")
-Blocks = dict[str, list[Kernel]]
+Blocks = dict[str, list[LoopKernel]]
 
 
 class Sensitivity:
@@ -54,7 +54,7 @@ class Sensitivity:
         self, form: DescriptorForm, binding: Binding, network: Network, name: str, at: tuple[int, ...]
     ) -> None:
         """at: the index of an element; network: its parameters may be formulas in others."""
-        slopes = [_Slope(network, binding, rate_name(name, order), at) for order in range(LAST + 1)]
+        slopes = [_ParameterSlope(network, binding, rate_name(name, order), at) for order in range(LAST + 1)]
         blocks = _by_order(form, [{b.name: _map_rows(b, slope) for b in form.blocks} for slope in slopes])
         self._oracles = [
             Oracle(replace(form, blocks=tuple(Block(n, tuple(k)) for n, k in blocks.get(order, {}).items())), binding)
@@ -68,7 +68,7 @@ class Sensitivity:
         return self._oracles[order - FIRST].rows(block, t, y, yd)
 
 
-class _Slope:
+class _ParameterSlope:
     """The derivative of expressions by a parameter, formulas of other parameters followed."""
 
     def __init__(self, network: Network, binding: Binding, name: str, at: tuple[int, ...]) -> None:
@@ -114,12 +114,12 @@ def _where(indices: Sequence[Node], at: Sequence[int], there: Node, elsewhere: N
     return there
 
 
-def _by_order(form: DescriptorForm, by: Sequence[dict[str, list[Kernel]]]) -> dict[int, Blocks]:
+def _by_order(form: DescriptorForm, by: Sequence[dict[str, list[LoopKernel]]]) -> dict[int, Blocks]:
     """Slopes of all blocks by order; by: those by u, u' and u'' as the rows read them."""
     integrated = {offset.label for offset in form.offsets}
     found: dict[int, Blocks] = {}
 
-    def put(order: int, block: str, kernels: Iterable[Kernel], *, own: bool | None = None) -> None:
+    def put(order: int, block: str, kernels: Iterable[LoopKernel], *, own: bool | None = None) -> None:
         """The rows of families that the block has; own: those of integrated constraints alone, or without."""
         there = form.block(block)
         labels = {form.rows[s.row].owner for k in there.kernels for s in k.rows} if there is not None else set()
@@ -127,7 +127,7 @@ def _by_order(form: DescriptorForm, by: Sequence[dict[str, list[Kernel]]]) -> di
         for kernel in kernels:
             rows = tuple(s for s in kernel.rows if form.rows[s.row].owner in wanted)
             if rows:
-                found.setdefault(order, {}).setdefault(block, []).append(Kernel(kernel.nest, rows))
+                found.setdefault(order, {}).setdefault(block, []).append(LoopKernel(kernel.nest, rows))
 
     # the derivative of a row by u' is the derivative of its rate by u'', and so on
     for order, slopes in enumerate(by):
@@ -147,10 +147,10 @@ def _by_order(form: DescriptorForm, by: Sequence[dict[str, list[Kernel]]]) -> di
     return found
 
 
-def _map_rows(block: Block, change: Callable[[Node], Node]) -> list[Kernel]:
+def _map_rows(block: Block, change: Callable[[Node], Node]) -> list[LoopKernel]:
     """The block with its expressions changed, without the rows that are zero."""
     kernels = (
-        Kernel(k.nest, tuple(replace(s, expression=change(s.expression)) for s in k.rows)) for k in block.kernels
+        LoopKernel(k.nest, tuple(replace(s, expression=change(s.expression)) for s in k.rows)) for k in block.kernels
     )
-    kept = (Kernel(k.nest, tuple(s for s in k.rows if not is_const(s.expression, 0.0))) for k in kernels)
+    kept = (LoopKernel(k.nest, tuple(s for s in k.rows if not is_const(s.expression, 0.0))) for k in kernels)
     return [k for k in kept if k.rows]

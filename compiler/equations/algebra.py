@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 from typing import Any
 
-from sysdyn.compiler.equations.order import Order
+from sysdyn.compiler.equations.order import FactorOrder
 from sysdyn.dsl.model.expression import Node, add, call, const, power, product, topological
 
 _NAMES = {
@@ -26,7 +26,7 @@ class Algebra:
     signs of factors follow that order.
     """
 
-    def __init__(self, order: Order, leaves: Iterable[Node] = ()) -> None:
+    def __init__(self, order: FactorOrder, leaves: Iterable[Node] = ()) -> None:
         import sympy
 
         self.sympy: Any = sympy

@@ -12,14 +12,14 @@ from collections.abc import Iterator, Sequence
 
 from sysdyn.compiler.equations.algebra import Algebra
 from sysdyn.compiler.equations.joining import collect_terms, shorter
-from sysdyn.compiler.equations.order import Order
-from sysdyn.compiler.equations.pieces import Piece, pieces
+from sysdyn.compiler.equations.order import FactorOrder
+from sysdyn.compiler.equations.pieces import EquationPiece, pieces
 from sysdyn.compiler.forms.conjugates import negate_conjugates
-from sysdyn.compiler.forms.descriptor import BESIDE, DescriptorForm, Equations
+from sysdyn.compiler.forms.descriptor import BESIDE, DescriptorForm, EquationFamily
 from sysdyn.compiler.forms.efforts import PREFIX, effort
 from sysdyn.compiler.forms.lowering import whole
 from sysdyn.compiler.forms.momenta import momentum, resolve
-from sysdyn.compiler.model.energies import EnergyModel, Family
+from sysdyn.compiler.model.energies import EnergyModel, UnknownFamily
 from sysdyn.compiler.model.terms import Nest
 from sysdyn.dsl.model.calculus import derivative
 from sysdyn.dsl.model.expression import Node, add, mul, neg, param, sub, var, variables
@@ -74,7 +74,7 @@ class Equation:
 
 
 @dataclass(frozen=True, slots=True)
-class Effort:
+class EffortTerms:
     """Terms of an applied effort times the variation of a displacement, summed over loops."""
 
     over: Nest
@@ -88,14 +88,14 @@ class Function:
 
     name: str
     terms: tuple[Summed, ...]
-    efforts: tuple[Effort, ...] = ()
+    efforts: tuple[EffortTerms, ...] = ()
 
 
 def algebra_of(form: DescriptorForm, parameters: Sequence[str]) -> Algebra:
     """Symbols for a form: its unknowns as it lists them, parameters as they were declared."""
     scalars = {owner for owner, shape in form.shapes if not shape} | {o for o, places in form.hulls if not places[0][0]}
     known = [var(f.owner, f.kind) for f in form.families if f.owner in scalars and f.kind not in BESIDE]
-    return Algebra(Order(parameters), [*known, *map(param, parameters)])
+    return Algebra(FactorOrder(parameters), [*known, *map(param, parameters)])
 
 
 def equations(algebra: Algebra, model: EnergyModel, form: DescriptorForm, most: int) -> Iterator[Equation]:
@@ -107,15 +107,15 @@ def equations(algebra: Algebra, model: EnergyModel, form: DescriptorForm, most: 
         yield from _of_row(algebra, row, [_momentum(model, row.owner)] if solved else pieces(form, number))
 
 
-def _momentum(model: EnergyModel, owner: str) -> Piece:
+def _momentum(model: EnergyModel, owner: str) -> EquationPiece:
     """P - dT*/df of a coordinate whose row is solved for its flow in the residual."""
     own = var(owner, model.mirror.conjugate)
-    return Piece((), (), (), sub(own, momentum(model, own)))
+    return EquationPiece((), (), (), sub(own, momentum(model, own)))
 
 
 def kinematics(model: EnergyModel, form: DescriptorForm) -> Iterator[Equation]:
     """Q' = f of each displacement that is an unknown."""
-    coordinates: dict[str, Family] = {c.name: c for c in model.coordinates}
+    coordinates: dict[str, UnknownFamily] = {c.name: c for c in model.coordinates}
     for family in form.families:
         if family.kind == "q":
             nest, at = whole(coordinates[family.owner])
@@ -124,9 +124,9 @@ def kinematics(model: EnergyModel, form: DescriptorForm) -> Iterator[Equation]:
             yield Equation("kinematic", family.owner, family.place, (rate,), (flow,), nest)
 
 
-def _of_row(algebra: Algebra, row: Equations, found: Sequence[Piece]) -> Iterator[Equation]:
+def _of_row(algebra: Algebra, row: EquationFamily, found: Sequence[EquationPiece]) -> Iterator[Equation]:
     """One equation where the pieces hold alike, else 0 = their sum, range by range."""
-    groups: dict[tuple[Nest, tuple[tuple[int, Node], ...]], list[Piece]] = {}
+    groups: dict[tuple[Nest, tuple[tuple[int, Node], ...]], list[EquationPiece]] = {}
     for piece in found:
         groups.setdefault((piece.where, piece.fixed), []).append(piece)
     wide = sorted(groups or {((), ()): []}, key=lambda key: (len(key[1]), -len(key[0])))
@@ -223,4 +223,4 @@ def functions(algebra: Algebra, model: EnergyModel) -> Iterator[Function]:
                 works.setdefault((work.loops, node), []).append(effort)
     efforts = {key: collect_terms(algebra, add(*found)) for key, found in works.items()}
     if any(efforts.values()):
-        yield Function("W", (), tuple(Effort(loops, terms, on) for (loops, on), terms in efforts.items() if terms))
+        yield Function("W", (), tuple(EffortTerms(loops, terms, on) for (loops, on), terms in efforts.items() if terms))

@@ -16,7 +16,7 @@ from dataclasses import replace
 from typing import Any
 
 from sysdyn.compiler.equations.algebra import Algebra
-from sysdyn.compiler.equations.book import Effort, Equation, Function, Summed, sides, sum_terms
+from sysdyn.compiler.equations.book import EffortTerms, Equation, Function, Summed, sides, sum_terms
 from sysdyn.compiler.equations.joining import collect_terms, length, shortest, sort_factors, turned_factors
 from sysdyn.compiler.forms.descriptor import DescriptorForm
 from sysdyn.compiler.forms.momenta import momentum
@@ -41,7 +41,7 @@ class NoSuchEquations(Exception):  # noqa: N818
 
 
 @dataclass(frozen=True, slots=True)
-class Row:
+class PlainRow:
     """A row without its place in families: the sum that is zero."""
 
     block: str
@@ -58,7 +58,7 @@ class Matrix:
     rows: tuple[tuple[tuple[Node, ...], ...], ...]
 
 
-def rows_of(form: DescriptorForm, *blocks: str) -> list[Row]:
+def rows_of(form: DescriptorForm, *blocks: str) -> list[PlainRow]:
     """The rows of some blocks, each block's reactions included.  NoSuchEquations for families over ranges."""
     with_reactions = {"dynamics": ("dynamics", "phi_reaction", "psi_reaction")}
     found: dict[tuple[str, int], list[Node]] = {}
@@ -74,7 +74,7 @@ def rows_of(form: DescriptorForm, *blocks: str) -> list[Row]:
                         raise NoSuchEquations("families over ranges are not written out: --form descriptor keeps them")
                     found.setdefault((name, s.row), []).append(s.expression)
     return [
-        Row(name, form.rows[k].owner, form.rows[k].place, add(*parts))
+        PlainRow(name, form.rows[k].owner, form.rows[k].place, add(*parts))
         for (name, k), parts in sorted(found.items(), key=lambda item: (blocks.index(item[0][0]), item[0][1]))
     ]
 
@@ -115,7 +115,9 @@ def _is(node: Node, kind: str, order: int) -> bool:
     return node.op == "var" and node.data[1:] == (kind, order)
 
 
-def _jacobian(algebra: Algebra, rows: Sequence[Row], by: Sequence[Node]) -> tuple[tuple[tuple[Node, ...], ...], ...]:
+def _jacobian(
+    algebra: Algebra, rows: Sequence[PlainRow], by: Sequence[Node]
+) -> tuple[tuple[tuple[Node, ...], ...], ...]:
     return tuple(tuple(_entry(algebra, derivative(row.expression, v)) for v in by) for row in rows)
 
 
@@ -162,7 +164,7 @@ def _quotient(algebra: Algebra, value: Any) -> tuple[Node, ...]:
     return apart if length(algebra, apart) <= length(algebra, (whole,)) else (whole,)
 
 
-def _solve_rows(algebra: Algebra, rows: Sequence[Row], wanted: Sequence[Node]) -> list[Any]:
+def _solve_rows(algebra: Algebra, rows: Sequence[PlainRow], wanted: Sequence[Node]) -> list[Any]:
     """The unknowns from rows that are linear in them.  NoSuchEquations where these are singular, too many, or none."""
     if not 0 < len(wanted) <= LARGEST or len(rows) != len(wanted):
         raise NoSuchEquations(
@@ -292,7 +294,7 @@ def variation(algebra: Algebra, function: Function, form: DescriptorForm) -> Fun
     whole = add(*(t.expression for t in function.terms))
     on = [n for kind in ("q", "p") for n in unknowns(form, kind)]
     slopes = ((n, collect_terms(algebra, derivative(whole, n))) for n in on)
-    return Function(function.name, (), tuple(Effort((), terms, n) for n, terms in slopes if terms))
+    return Function(function.name, (), tuple(EffortTerms((), terms, n) for n, terms in slopes if terms))
 
 
 def canonical(algebra: Algebra, model: EnergyModel, form: DescriptorForm) -> tuple[Function, list[Equation]]:
@@ -332,7 +334,7 @@ def canonical(algebra: Algebra, model: EnergyModel, form: DescriptorForm) -> tup
     return function, found
 
 
-def _momentum_row(model: EnergyModel, row: Row) -> Row:
+def _momentum_row(model: EnergyModel, row: PlainRow) -> PlainRow:
     """P - dT*/df where the residual solves for the flow."""
     if row.owner not in model.solved:
         return row

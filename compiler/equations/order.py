@@ -10,7 +10,7 @@ RANKS = ("q", "s", "e", "p", "f")
 """Kinds of unknowns in the order in which the factors of a term are written; rates follow, then multipliers."""
 
 
-class Order:
+class FactorOrder:
     """How the factors of a term follow each other; parameters: their names as declared."""
 
     def __init__(self, parameters: Sequence[str] = ()) -> None:

@@ -10,7 +10,7 @@ from sysdyn.values import dataclass
 
 
 @dataclass(frozen=True, slots=True)
-class Piece:
+class EquationPiece:
     """A summand of the equation at the indices #0, #1, ...: where it holds, what it is summed over."""
 
     where: Nest
@@ -19,7 +19,7 @@ class Piece:
     expression: Node
 
 
-def pieces(form: DescriptorForm, number: int) -> list[Piece]:
+def pieces(form: DescriptorForm, number: int) -> list[EquationPiece]:
     """The summands of one row family as written (its derivatives left out)."""
     found = []
     for block in form.blocks:
@@ -31,7 +31,7 @@ def pieces(form: DescriptorForm, number: int) -> list[Piece]:
     return found
 
 
-def _piece(summand: Summand, nest: Nest) -> Piece:
+def _piece(summand: Summand, nest: Nest) -> EquationPiece:
     """A summand of a row over the row's own indices: where it holds, which of these are fixed, and the loops it sums
     over.
     """
@@ -59,7 +59,7 @@ def _piece(summand: Summand, nest: Nest) -> Piece:
     )
     bounds = tuple(Loop(w.index, substitute(w.first, change), substitute(w.last, change)) for w in where)
     pairs = tuple((d, substitute(at, change)) for d, at in fixed)
-    return Piece(bounds, pairs, over, substitute(summand.expression, change))
+    return EquationPiece(bounds, pairs, over, substitute(summand.expression, change))
 
 
 def _shift(at: Node, name: str) -> Node | None:

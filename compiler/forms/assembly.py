@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from sysdyn.compiler.forms.descriptor import BLOCKS, HOME, Block, Equations, Kernel, Summand
+from sysdyn.compiler.forms.descriptor import BLOCKS, HOME, Block, EquationFamily, LoopKernel, Summand
 from sysdyn.compiler.model.terms import Nest
 from sysdyn.dsl.model.calculus import without_signals
 from sysdyn.dsl.model.expression import Node, add, is_const
@@ -21,11 +21,11 @@ class Assembly:
     """Row families by number, and what is added to them block by block."""
 
     def __init__(self) -> None:
-        self.rows: list[Equations] = []
+        self.rows: list[EquationFamily] = []
         self._numbers: dict[tuple[str, str], int] = {}
         self._found: dict[str, dict[_Bounds, dict[_Place, list[Node]]]] = {name: {} for name in BLOCKS}
 
-    def family(self, equations: Equations) -> None:
+    def family(self, equations: EquationFamily) -> None:
         """Declare a row family; its key is (block, owner)."""
         self._numbers[equations.block, equations.owner] = len(self.rows)
         self.rows.append(equations)
@@ -50,10 +50,10 @@ class Assembly:
         return tuple(found)
 
 
-def _kernel(bounds: _Bounds, places: dict[_Place, list[Node]]) -> Kernel:
+def _kernel(bounds: _Bounds, places: dict[_Place, list[Node]]) -> LoopKernel:
     nest = tuple(Loop(f"#{k}", first, last) for k, (first, last) in enumerate(bounds))
     summands = (Summand(row, at, add(*nodes)) for (row, at), nodes in sorted(places.items(), key=_order))
-    return Kernel(nest, tuple(s for s in summands if not is_const(s.expression, 0.0)))
+    return LoopKernel(nest, tuple(s for s in summands if not is_const(s.expression, 0.0)))
 
 
 def _order(item: tuple[_Place, list[Node]]) -> tuple[int, tuple[int, ...]]:

@@ -10,7 +10,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 
 import numpy as np
-from sysdyn.compiler.model.energies import EnergyModel, Family
+from sysdyn.compiler.model.energies import EnergyModel, UnknownFamily
 from sysdyn.compiler.model.interpret import over
 from sysdyn.compiler.model.parameters import Extents, Parameters
 from sysdyn.compiler.model.terms import Nest, counter, local_variables
@@ -20,7 +20,7 @@ from sysdyn.dsl.model.network import Loop, loop_ranges
 Cover = tuple[str, tuple[tuple[Nest, Node], ...]]  # coordinate; where stores move with it: loops, index
 
 
-def cover(model: EnergyModel, family: Family, *, given: bool) -> Cover | None:
+def cover(model: EnergyModel, family: UnknownFamily, *, given: bool) -> Cover | None:
     """Where kinetic stores move with a family; None where they do with all of it, by the text alone."""
     m = model.mirror
     function, kind = (m.energy, m.conjugate) if given else (m.coenergy, m.rate)
@@ -43,7 +43,7 @@ def inside(name: str) -> Nest:
     return (Loop("#0", param(f"#first {name}"), param(f"#last {name}")),)
 
 
-def outside(family: Family) -> tuple[Nest, Nest]:
+def outside(family: UnknownFamily) -> tuple[Nest, Nest]:
     """The loops over the other elements, before and behind."""
     (first, last) = family.shape[0]
     before = Loop("#0", first, add(param(f"#first {family.name}"), const(-1)))

@@ -67,7 +67,7 @@ class Unknowns:
 
 
 @dataclass(frozen=True, slots=True)
-class Equations:
+class EquationFamily:
     """A family of rows."""
 
     block: str
@@ -91,7 +91,7 @@ class Summand:
 
 
 @dataclass(frozen=True, slots=True)
-class Kernel:
+class LoopKernel:
     """Local expressions under one loop nest."""
 
     nest: Nest
@@ -103,7 +103,7 @@ class Block:
     """A group of rows that the runtime places as a whole."""
 
     name: str
-    kernels: tuple[Kernel, ...]
+    kernels: tuple[LoopKernel, ...]
 
 
 @dataclass(frozen=True, slots=True)
@@ -144,7 +144,7 @@ class DescriptorForm:
 
     formulation: str
     families: tuple[Unknowns, ...]
-    rows: tuple[Equations, ...]
+    rows: tuple[EquationFamily, ...]
     blocks: tuple[Block, ...]
     pins: tuple[Pin, ...]
     offsets: tuple[Offset, ...]

@@ -15,16 +15,16 @@ from collections.abc import Iterator, Mapping
 from dataclasses import replace
 
 from sysdyn.compiler.forms.assembly import Assembly
-from sysdyn.compiler.forms.descriptor import HOME, DescriptorForm, Equations, Pin, Unknowns
+from sysdyn.compiler.forms.descriptor import HOME, DescriptorForm, EquationFamily, Pin, Unknowns
 from sysdyn.compiler.forms.lagrangian import lagrangian
 from sysdyn.compiler.forms.lowering import total_rate
 from sysdyn.compiler.forms.minors import determinant
 from sysdyn.compiler.forms.speeds import LARGEST, Speeds, definition, kinematics, speeds_of
-from sysdyn.compiler.model.energies import EnergyModel, Family, Row
+from sysdyn.compiler.model.energies import EnergyModel, Row, UnknownFamily
 from sysdyn.compiler.model.terms import Nest, counter, local_variables
 from sysdyn.dsl.model.calculus import derivative, signals_held
+from sysdyn.dsl.model.connected_components import Joined
 from sysdyn.dsl.model.expression import Node, add, const, is_const, mul, neg, substitute, topological, var, variables
-from sysdyn.dsl.model.joined import Joined
 from sysdyn.dsl.model.network import loop_ranges
 from sysdyn.dsl.text.diagnostics import Diagnostic, ModelError
 from sysdyn.values import dataclass
@@ -171,7 +171,7 @@ def _flows(row: Row) -> list[str]:
     return [flow.data[0] for term in row.terms for flow in local_variables(term.expression, "f")]
 
 
-def _entries(row: Row, families: Mapping[str, Family]) -> Entries | None:
+def _entries(row: Row, families: Mapping[str, UnknownFamily]) -> Entries | None:
     """Coefficients of the flows of a row, all of the row's own element; None where one is of another."""
     found: Entries = {}
     for term in row.terms:
@@ -282,7 +282,7 @@ class _Projected:
         # a balance along each speed
         for speed in self.speeds.speeds:
             unit = f"W/({speed.unit})"
-            self.assembly.family(Equations("dynamics", speed.name, speed.name, "dynamics", unit, speed.place))
+            self.assembly.family(EquationFamily("dynamics", speed.name, speed.name, "dynamics", unit, speed.place))
         if self.lagrange.block("phi_reaction") is not None:
             for row in self.lagrange.rows:
                 if row.block == "dynamics":
@@ -320,7 +320,7 @@ class _Projected:
             if value is not None and speed.place is not None:
                 yield Pin(number[speed.name, "f"], (), value, False, (), speed.place)
 
-    def _left_out(self, row: Equations) -> bool:
+    def _left_out(self, row: EquationFamily) -> bool:
         return row.block == "psi" and row.owner in self.speeds.left_out
 
     def _is_read(self, reaction: Node) -> bool:

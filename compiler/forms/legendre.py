@@ -61,7 +61,7 @@ Ends = tuple[float, float]
 
 
 @dataclass(frozen=True, slots=True)
-class _Block:
+class _JoinedFlows:
     """Flows that terms join, by coordinate, and these terms by their number."""
 
     flows: tuple[Node, ...]
@@ -114,7 +114,7 @@ def _rest_on(inertia: Square, flows: Sequence[Node]) -> Iterator[tuple[Node, Nod
             yield f, fixed
 
 
-def _blocks(terms: Sequence[Term], rate: str) -> Iterator[_Block]:
+def _blocks(terms: Sequence[Term], rate: str) -> Iterator[_JoinedFlows]:
     """Sets of flows without a common term; those that a loop or an index touches are left out."""
     parts: list[tuple[dict[Node, None], list[int]]] = []
     lost: set[str] = set()
@@ -136,7 +136,7 @@ def _blocks(terms: Sequence[Term], rate: str) -> Iterator[_Block]:
         parts = [*apart, (own, numbers)]
     for flows, numbers in parts:
         if not any(n.data[0] in lost for n in flows):
-            yield _Block(tuple(flows), tuple(numbers))
+            yield _JoinedFlows(tuple(flows), tuple(numbers))
 
 
 def _inertia(whole: Node, flows: Sequence[Node], known: Values) -> list[list[Node]] | None:

@@ -18,7 +18,7 @@ from contextlib import nullcontext
 
 from sysdyn.compiler.forms.assembly import Assembly
 from sysdyn.compiler.forms.coverage import Cover, cover, inside, outside
-from sysdyn.compiler.forms.descriptor import AUDIT, DescriptorForm, Equations, Unknowns
+from sysdyn.compiler.forms.descriptor import AUDIT, DescriptorForm, EquationFamily, Unknowns
 from sysdyn.compiler.forms.efforts import Effort, efforts
 from sysdyn.compiler.forms.meters.audit import add_audit
 from sysdyn.compiler.forms.meters.observing import (
@@ -36,7 +36,7 @@ from sysdyn.compiler.forms.momenta import (
     jumping,
     resolve_momenta,
 )
-from sysdyn.compiler.model.energies import EnergyModel, Family, Row
+from sysdyn.compiler.model.energies import EnergyModel, Row, UnknownFamily
 from sysdyn.compiler.model.terms import Nest, counter, local_variables
 from sysdyn.dsl.model.calculus import derivative, differential, gradient, moving, parameter_rates, time_derivative
 from sysdyn.dsl.model.calculus import rate as rate_of
@@ -101,7 +101,7 @@ def lower(model: EnergyModel, formulation: str, *, legendre: bool) -> Descriptor
     )
 
 
-def whole(family: Family) -> tuple[Nest, tuple[Node, ...]]:
+def whole(family: UnknownFamily) -> tuple[Nest, tuple[Node, ...]]:
     """The loop nest over all elements of a family, and the indices of its element there."""
     nest = tuple(Loop(f"#{k}", first, last) for k, (first, last) in enumerate(family.shape))
     return nest, tuple(counter(k) for k in range(len(nest)))
@@ -228,22 +228,22 @@ class _Lowering:
         declare = self.assembly.family
         # balances, momenta, constraints, rates of states
         for c in self.model.coordinates:
-            declare(Equations("dynamics", c.name, c.name, "dynamics", c.units["e"], c.place))
+            declare(EquationFamily("dynamics", c.name, c.name, "dynamics", c.units["e"], c.place))
         for c in self.model.coordinates:
             if c.name in self.carriers:
-                declare(Equations("momentum", c.name, c.name, "momentum", c.units["p"], c.place))
+                declare(EquationFamily("momentum", c.name, c.name, "momentum", c.units["p"], c.place))
         for kind in ("phi", "psi", "gamma"):
             offset = {o.label for o in self.model.offsets} if kind == "phi" else set[str]()
             for name, rows in _by_name(self.model.of_kind(kind)).items():
                 rate = all(self._has_rate(row) for row in rows)
                 unit = self.model.labels[name]
                 unit = f"{unit}.s" if name in offset else unit
-                declare(Equations(kind, name, name, kind, unit, rows[0].place, rate))
+                declare(EquationFamily(kind, name, name, kind, unit, rows[0].place, rate))
         said = _by_name(self.model.of_kind("lambda"))
         for s in self.model.states:
             rows = said.get(s.name, [])
             place = rows[0].place if rows else s.place
-            declare(Equations("lambda", s.name, s.name, "lambda", f"{s.units['s']}/s", place))
+            declare(EquationFamily("lambda", s.name, s.name, "lambda", f"{s.units['s']}/s", place))
 
     def _has_rate(self, row: Row) -> bool:
         """Whether the total time derivative of every row is known: multipliers have none."""
@@ -270,7 +270,7 @@ class _Lowering:
             for p in local_variables(term.expression, mirror.conjugate):
                 self._momentum(p.data[0], p.args, term.loops, derivative(term.expression, p))
 
-    def _carrier(self, family: Family) -> None:
+    def _carrier(self, family: UnknownFamily) -> None:
         """P' of the elements that a store moves with, and the momentum row of all: p, or -f where T is given."""
         m, name = self.model.mirror, family.name
         given = name in self.stores
@@ -319,7 +319,7 @@ class _Lowering:
             if c.name in names:
                 owner, (nest, at) = HELD + c.name, whole(c)
                 self.families.append(Unknowns(owner, "unsaid", owner, f"p {c.units['e']}", c.place))
-                rows = Equations("initial", c.name, owner, "initial", c.units["p"], c.place, content=True)
+                rows = EquationFamily("initial", c.name, owner, "initial", c.units["p"], c.place, content=True)
                 self.assembly.family(rows)
                 self.assembly.add("initial", owner, at, nest, neg(var(owner, "unsaid", *at)))
         # dT*/df of each

@@ -19,9 +19,10 @@ from collections.abc import Callable, Iterator, Mapping
 from dataclasses import replace
 
 from sysdyn.compiler.forms.momenta import coordinates_with_inertia
-from sysdyn.compiler.model.energies import EnergyModel, Family, reading, tangible
+from sysdyn.compiler.model.energies import EnergyModel, UnknownFamily, reading, tangible
 from sysdyn.compiler.model.terms import Nest, has_reduction, local_variables, vanishes
 from sysdyn.dsl.model.calculus import derivative, differential
+from sysdyn.dsl.model.connected_components import Joined
 from sysdyn.dsl.model.expression import (
     Node,
     add,
@@ -36,7 +37,6 @@ from sysdyn.dsl.model.expression import (
     variables,
 )
 from sysdyn.dsl.model.expression_text import to_text
-from sysdyn.dsl.model.joined import Joined
 from sysdyn.values import dataclass
 
 
@@ -82,9 +82,9 @@ def _measure_from_anchors(
     return _substitute_relative(model, change) if change else model
 
 
-def _groups(model: EnergyModel, function: str, kind: str) -> Iterator[list[Family]]:
+def _groups(model: EnergyModel, function: str, kind: str) -> Iterator[list[UnknownFamily]]:
     """Families of coordinates that terms of a state function join, in the order of the model."""
-    joined, groups = Joined[str](), dict[str, list[Family]]()
+    joined, groups = Joined[str](), dict[str, list[UnknownFamily]]()
     for term in model.function(function):
         names = [n.data[0] for n in local_variables(term.expression, kind)]
         for name in names:
@@ -94,7 +94,7 @@ def _groups(model: EnergyModel, function: str, kind: str) -> Iterator[list[Famil
     return (group for group in groups.values() if len(group) > 1)
 
 
-def _candidates(model: EnergyModel, group: list[Family], kind: str) -> list[Family]:
+def _candidates(model: EnergyModel, group: list[UnknownFamily], kind: str) -> list[UnknownFamily]:
     """What a group may be counted from: the last with fewest indices; of a group without inertia what has some, or
     any of most indices before others.
     """
@@ -105,7 +105,9 @@ def _candidates(model: EnergyModel, group: list[Family], kind: str) -> list[Fami
     return heavy if len(heavy) == 1 else [] if heavy else sorted(group, key=lambda c: -len(c.shape))
 
 
-def _anchors(model: EnergyModel, function: str, kind: str, group: list[Family], anchor: Family) -> _Anchors:
+def _anchors(
+    model: EnergyModel, function: str, kind: str, group: list[UnknownFamily], anchor: UnknownFamily
+) -> _Anchors:
     """How the families of a group are counted from one of them; empty where they cannot be."""
     found = {anchor.name: _Anchor(anchor.name, tuple((k, const(0.0)) for k in range(len(anchor.shape))))}
     shapes = {c.name: c for c in group}
@@ -145,7 +147,7 @@ def _runs(node: Node) -> bool:
     return any(n.op == "index" for n in topological([node]))
 
 
-def _inside(family: Family, anchor: Family, places: tuple[tuple[int | None, Node], ...]) -> bool:
+def _inside(family: UnknownFamily, anchor: UnknownFamily, places: tuple[tuple[int | None, Node], ...]) -> bool:
     """Whether each element has an anchor, by the text."""
     for (k, c), (first, last) in zip(places, anchor.shape, strict=True):
         low, high = (c, c) if k is None else (add(family.shape[k][0], c), add(family.shape[k][1], c))

@@ -16,7 +16,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from itertools import combinations
 
 from sysdyn.compiler.forms.minors import determinant, inverse
-from sysdyn.compiler.model.energies import EnergyModel, Quantity
+from sysdyn.compiler.model.energies import EnergyModel, TracedQuantity
 from sysdyn.compiler.model.terms import local_variables
 from sysdyn.dsl.model.calculus import derivative, signals_held
 from sysdyn.dsl.model.evaluation import evaluate
@@ -126,7 +126,7 @@ def _constraints(model: EnergyModel) -> Iterable[_Line]:
         yield _Line(row.name, entries, rest, None)
 
 
-def _quasi(q: Quantity, scalars: Sequence[str]) -> _Line | None:
+def _quasi(q: TracedQuantity, scalars: Sequence[str]) -> _Line | None:
     flows = local_variables(q.expression, "f")
     if any(n.data[0] not in scalars for n in flows) or any(n.op == "reduce" for n in topological([q.expression])):
         return None

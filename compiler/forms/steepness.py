@@ -11,7 +11,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from sysdyn.compiler.forms.descriptor import SCALED, Block, DescriptorForm, Kernel, Summand
+from sysdyn.compiler.forms.descriptor import SCALED, Block, DescriptorForm, LoopKernel, Summand
 from sysdyn.dsl.model.expression import Node, call, conditional, const, linear, product, topological, variables
 
 MILD = frozenset(("sin", "cos", "atan", "atan2", "hypot", "asinh", "signal"))
@@ -90,7 +90,7 @@ def add_scale_blocks(form: DescriptorForm) -> DescriptorForm:
     found = {s.row for block in held for kernel in block.kernels for s in kernel.rows if steep(s.expression)}
     made = []
     for block in held:
-        kernels = (Kernel(k.nest, tuple(_scale(s) for s in k.rows if s.row in found)) for k in block.kernels)
+        kernels = (LoopKernel(k.nest, tuple(_scale(s) for s in k.rows if s.row in found)) for k in block.kernels)
         kept = tuple(kernel for kernel in kernels if kernel.rows)
         if kept:
             made.append(Block(f"{block.name}_scale", kept))

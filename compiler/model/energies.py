@@ -53,7 +53,7 @@ class Row:
 
 
 @dataclass(frozen=True, slots=True)
-class Family:
+class UnknownFamily:
     """A coordinate, an implicit unknown or a state with its shape and units by kind of unknown.
 
     balance: of a coordinate, the unit of effort times displacement (J but in pseudo domains).
@@ -87,8 +87,8 @@ class Offset:
 
 
 @dataclass(frozen=True, slots=True)
-class Target:
-    """`init`: target = value (fixed) or ~ value, for all iterations of the nest; the others: as in `Initial`."""
+class InitialTarget:
+    """`init`: target = value (fixed) or ~ value, for all iterations; the others: as in `InitialCondition`."""
 
     target: Node
     value: Node
@@ -102,7 +102,7 @@ class Target:
 
 
 @dataclass(frozen=True, slots=True)
-class Quantity:
+class TracedQuantity:
     """A traced quantity (stored) or one side of an expect."""
 
     name: str
@@ -116,20 +116,20 @@ class Quantity:
 class EnergyModel:
     """Everything a formulation is lowered from; expressions are canonical (see `terms`)."""
 
-    coordinates: tuple[Family, ...]
-    unknowns: tuple[Family, ...] = ()
-    states: tuple[Family, ...] = ()
-    positions: tuple[Family, ...] = ()  # unknowns of the start alone
+    coordinates: tuple[UnknownFamily, ...]
+    unknowns: tuple[UnknownFamily, ...] = ()
+    states: tuple[UnknownFamily, ...] = ()
+    positions: tuple[UnknownFamily, ...] = ()  # unknowns of the start alone
     functions: Mapping[str, tuple[Term, ...]] = field(default_factory=dict)
     works: tuple[Virtual, ...] = ()
     rows: tuple[Row, ...] = ()
     offsets: tuple[Offset, ...] = ()
-    initials: tuple[Target, ...] = ()
-    quantities: tuple[Quantity, ...] = ()
+    initials: tuple[InitialTarget, ...] = ()
+    quantities: tuple[TracedQuantity, ...] = ()
     labels: Mapping[str, str] = field(default_factory=dict)  # unit of each constraint label
     mirror: Mirror = PRIMAL
     quasis: tuple[str, ...] = ()
-    speeds: tuple[Quantity, ...] = ()
+    speeds: tuple[TracedQuantity, ...] = ()
     switched: frozenset[str] = frozenset()  # labels of constraints that hold at times
     discretes: frozenset[str] = frozenset()  # parameters that events assign
     assigned: frozenset[str] = frozenset()  # states that events assign
@@ -171,7 +171,7 @@ def energies(network: Network) -> EnergyModel:
     """The energy model of a network; tangibility decided, psi rows not yet integrated."""
     model = EnergyModel(
         coordinates=tuple(
-            Family(
+            UnknownFamily(
                 c.name,
                 c.shape,
                 {
@@ -185,9 +185,11 @@ def energies(network: Network) -> EnergyModel:
             )
             for c in network.coordinates
         ),
-        unknowns=tuple(Family(u.name, u.shape, {"e": u.unit.text}, u.place) for u in network.unknowns),
-        states=tuple(Family(s.name, s.shape, {"s": s.unit.text}, s.place, measured=s.measured) for s in network.states),
-        positions=tuple(Family(s.name, s.shape, {"start": s.unit.text}, s.place) for s in network.positions),
+        unknowns=tuple(UnknownFamily(u.name, u.shape, {"e": u.unit.text}, u.place) for u in network.unknowns),
+        states=tuple(
+            UnknownFamily(s.name, s.shape, {"s": s.unit.text}, s.place, measured=s.measured) for s in network.states
+        ),
+        positions=tuple(UnknownFamily(s.name, s.shape, {"start": s.unit.text}, s.place) for s in network.positions),
         functions=_functions(network),
         works=tuple(_works(network)),
         rows=(*_constraints(network), *_dynamics(network)),
@@ -195,7 +197,7 @@ def energies(network: Network) -> EnergyModel:
         quantities=tuple(_quantities(network)),
         labels={c.name: c.unit.text for c in network.constraints},
         quasis=network.quasis,
-        speeds=tuple(Quantity(o.name, flows(o.expression), False, o.unit.text, o.place) for o in network.speeds),
+        speeds=tuple(TracedQuantity(o.name, flows(o.expression), False, o.unit.text, o.place) for o in network.speeds),
         switched=frozenset(s.label for s in network.switches if s.holds is None),
         discretes=frozenset(network.discretes),
         assigned=frozenset(_assigned_states(network)),
@@ -271,23 +273,23 @@ def _assigned_states(network: Network) -> Iterator[str]:
             yield from (n.data[0] for n in variables(action.target) if n.op == "var" and n.data[1] == "s")
 
 
-def _initials(network: Network) -> Iterator[Target]:
+def _initials(network: Network) -> Iterator[InitialTarget]:
     for i in network.initials:
         nest, (target, value) = canonical(i.loops, flows(i.target), flows(i.value))
-        yield Target(target, value, i.fixed, nest, i.place, i.store, i.unit, i.said, i.apart)
+        yield InitialTarget(target, value, i.fixed, nest, i.place, i.store, i.unit, i.said, i.apart)
 
 
-def _quantities(network: Network) -> Iterator[Quantity]:
+def _quantities(network: Network) -> Iterator[TracedQuantity]:
     """Traced quantities, each name once, then the sides of each expectation."""
     first = {o.name: o for o in reversed(network.observations)}
     for o in (o for o in network.observations if first[o.name] is o):
         _, (expression,) = canonical((), flows(o.expression))
-        yield Quantity(o.name, expression, o.stored, o.unit.text, o.place)
+        yield TracedQuantity(o.name, expression, o.stored, o.unit.text, o.place)
     for k, e in enumerate(network.expectations):
         for side, node in (("left", e.left), ("right", e.right), ("within", e.within)):
             if node is not None:
                 _, (expression,) = canonical((), flows(node))
-                yield Quantity(f"expect {k} {side}", expression, False, e.unit.text, e.place)
+                yield TracedQuantity(f"expect {k} {side}", expression, False, e.unit.text, e.place)
 
 
 def reading(model: EnergyModel) -> Iterator[tuple[Node, Nest, Place]]:

@@ -39,7 +39,7 @@ class Index:
 
 
 @dataclass(frozen=True, slots=True)
-class Reference:
+class FamilyReference:
     """An element of a family: y[at[family] + position]; position = ix[origin] + sum(index_k * ix[strides_k])."""
 
     family: int
@@ -49,7 +49,7 @@ class Reference:
 
 
 @dataclass(frozen=True, slots=True)
-class Element:
+class ArrayElement:
     """An element of a parameter array: p[ix[origin] + sum(index_k * ix[strides_k])]."""
 
     indices: tuple[Index, ...]
@@ -98,18 +98,18 @@ class Integers:
         slot = self.value(linear(0.0, rest)) if rest else -1
         return Index(loop, slot, int(constant))
 
-    def reference(self, family: int, owner: str, at: tuple[Node, ...], loops: dict[str, int]) -> Reference:
+    def reference(self, family: int, owner: str, at: tuple[Node, ...], loops: dict[str, int]) -> FamilyReference:
         """An element of the family of `owner`."""
         indices = tuple(self.index(node, loops) for node in at)
         origin = self.slot("origin", owner) if indices else -1
         strides = tuple(self.slot("stride", owner, k) for k in range(len(indices) - 1))
-        return Reference(family, indices, origin, strides)
+        return FamilyReference(family, indices, origin, strides)
 
-    def element(self, name: str, at: tuple[Node, ...], loops: dict[str, int]) -> Element:
+    def element(self, name: str, at: tuple[Node, ...], loops: dict[str, int]) -> ArrayElement:
         """An element of the parameter array `name`."""
         indices = tuple(self.index(node, loops) for node in at)
         strides = tuple(self.slot("step", name, k) for k in range(len(indices) - 1))
-        return Element(indices, self.slot("array", name), strides)
+        return ArrayElement(indices, self.slot("array", name), strides)
 
 
 def topological_of(rest: list[tuple[float, Node]]) -> list[Node]:

@@ -1,4 +1,4 @@
-"""What the author calls elements of families that were gathered (`gathered.py`): names and places in what is said."""
+"""What the author calls elements of families that were gathered (`alike_elements.py`): names and places in messages."""
 
 from __future__ import annotations
 

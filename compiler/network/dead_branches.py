@@ -14,13 +14,15 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Iterator, Sequence
 
-from sysdyn.compiler.network.influence import Link, Quantity
+from sysdyn.compiler.network.influence import InfluenceLink, Quantity
 from sysdyn.dsl.model.network import Branch, Network
 
 STORES = frozenset(("kinetic", "potential", "dissipator"))
 
 
-def dead_branches(network: Network, found: Sequence[Link], asked: frozenset[Quantity]) -> list[frozenset[Quantity]]:
+def dead_branches(
+    network: Network, found: Sequence[InfluenceLink], asked: frozenset[Quantity]
+) -> list[frozenset[Quantity]]:
     """Each dead branch with its end node; ties where there are no ends any more."""
     touched = Counter(q for link in found for q in link.joined)
     read = set(asked)
@@ -53,7 +55,7 @@ def _nodes(b: Branch) -> list[Quantity]:
 
 
 def _ties(
-    network: Network, found: Sequence[Link], able: Sequence[Branch], asked: frozenset[Quantity]
+    network: Network, found: Sequence[InfluenceLink], able: Sequence[Branch], asked: frozenset[Quantity]
 ) -> Iterator[frozenset[Quantity]]:
     """Each branch that alone joins nodes to the ground, to which nothing but branches refers."""
     ties = [b for b in able if b.domain.common == "effort" and None in _ends(b) and _nodes(b)]

@@ -36,7 +36,7 @@ EVERYTHING: Quantity = ("*", "")
 
 
 @dataclass(frozen=True, slots=True)
-class Link:
+class InfluenceLink:
     """One statement.  item: what the network holds; piece: of an energy, its summand."""
 
     item: Any
@@ -85,12 +85,12 @@ def quantities(network: Network) -> list[Quantity]:
     return list(dict.fromkeys((letter, item.name) for letter, items in groups.items() for item in items))
 
 
-def links(network: Network) -> tuple[Link, ...]:
+def links(network: Network) -> tuple[InfluenceLink, ...]:
     """One link a statement, and one a summand of an energy."""
     return tuple(_links(network))
 
 
-def _links(network: Network) -> Iterator[Link]:
+def _links(network: Network) -> Iterator[InfluenceLink]:
     """All statements of a network as links between quantities: joined both ways, or read one way."""
     # summand by summand: a term that nobody needs may go alone
     for e in network.energies:
@@ -100,47 +100,47 @@ def _links(network: Network) -> Iterator[Link]:
         yield _acting(network, w, [w.on], [w.effort])
     yield from _constraints(network)
     for d in network.dynamics:
-        yield Link(d, frozenset({("s", d.state.data[0])}), read_by(network, [d.expression]))
+        yield InfluenceLink(d, frozenset({("s", d.state.data[0])}), read_by(network, [d.expression]))
     for i in network.initials:
-        yield Link(i, read_by(network, [i.target, i.value]), frozenset())
+        yield InfluenceLink(i, read_by(network, [i.target, i.value]), frozenset())
     for b in network.branches:
         yield _branch(network, b)
     for c in network.couplings:
         yield _coupling(network, c)
 
 
-def _acting(network: Network, item: Any, acted: Sequence[Node], read: Sequence[Node]) -> Link:
+def _acting(network: Network, item: Any, acted: Sequence[Node], read: Sequence[Node]) -> InfluenceLink:
     """A statement that acts on the coordinates, nodes and branches of some expressions."""
     all_ = read_by(network, acted)
     joined = frozenset(q for q in all_ if q[0] in MECHANICAL)
-    return Link(item, joined, (all_ - joined) | read_by(network, read))
+    return InfluenceLink(item, joined, (all_ - joined) | read_by(network, read))
 
 
-def _link_of_workless(network: Network, item: Any, root: Node, own: frozenset[Quantity]) -> Link:
+def _link_of_workless(network: Network, item: Any, root: Node, own: frozenset[Quantity]) -> InfluenceLink:
     """A workless statement: its reactions hold signals fixed."""
     found = _acting(network, item, [signals_held(root)[0]], [root])
     return replace(found, joined=found.joined | own)
 
 
-def _branch(network: Network, b: Branch) -> Link:
+def _branch(network: Network, b: Branch) -> InfluenceLink:
     ends = [("n", end.node) for end in (b.plus, b.minus) if end is not None and end.node is not None]
     own, reads = frozenset([*ends, ("b", b.name)]), NOTHING if b.law is None else read_by(network, [b.law])
     if b.on is None:
-        return Link(b, own, reads)
+        return InfluenceLink(b, own, reads)
     along = _acting(network, b, [b.on], [])
-    return Link(b, along.joined | own, along.reads | reads)
+    return InfluenceLink(b, along.joined | own, along.reads | reads)
 
 
-def _coupling(network: Network, c: Coupling) -> Link:
+def _coupling(network: Network, c: Coupling) -> InfluenceLink:
     return _link_of_workless(network, c, c.ratio, frozenset({("b", c.first), ("b", c.second)}))
 
 
-def _constraints(network: Network) -> Iterator[Link]:
+def _constraints(network: Network) -> Iterator[InfluenceLink]:
     for c in network.constraints:
         if c.kind != "gamma":
             yield _link_of_workless(network, c, c.expression, frozenset({("c", c.name)}))
     for item, closed in _closures(network):
-        yield Link(item, closed, read_by(network, [item.expression]))
+        yield InfluenceLink(item, closed, read_by(network, [item.expression]))
 
 
 def _closures(network: Network) -> Iterator[tuple[Constraint, frozenset[Quantity]]]:
@@ -172,7 +172,7 @@ def _whole(c: Constraint, shape: Shape) -> bool:
     return ranges == shape and c.at == loop_indices(c.loops)
 
 
-def influences_on(found: Sequence[Link], asked: frozenset[Quantity]) -> frozenset[Quantity]:
+def influences_on(found: Sequence[InfluenceLink], asked: frozenset[Quantity]) -> frozenset[Quantity]:
     """All that influences what is asked: through what is joined both ways, through what is read one way."""
     of: dict[Quantity, list[int]] = {}
     # which links join each quantity

@@ -13,7 +13,7 @@ from collections.abc import Iterator, Sequence
 from operator import itemgetter
 
 from sysdyn.compiler.network.skeleton import Shaped, shape_of
-from sysdyn.dsl.model.joined import Joined
+from sysdyn.dsl.model.connected_components import Joined
 from sysdyn.dsl.model.network import Branch, Network, Terminal
 from sysdyn.values import dataclass
 
@@ -30,7 +30,7 @@ Site = tuple[str, int]
 
 
 @dataclass(frozen=True, slots=True)
-class Run:
+class BranchSequence:
     """Branches one after the other; moves: whether each end goes on by one; picked: whether it goes anywhere."""
 
     members: tuple[tuple[Branch, Shaped], ...]
@@ -40,7 +40,7 @@ class Run:
 
 
 @dataclass(frozen=True, slots=True)
-class Laws:
+class FamilyLaws:
     """By the names of branches that may stand in families: shapes of their laws, and a number that those share which
     are of one domain, kind, side and shape.
     """
@@ -49,13 +49,13 @@ class Laws:
     numbers: dict[str, int]
 
 
-Found = tuple[dict[str, Site], list[Run]]
+Found = tuple[dict[str, Site], list[BranchSequence]]
 """Nodes and branches of families."""
 
 
-def laws_of(network: Network) -> Laws:
+def laws_of(network: Network) -> FamilyLaws:
     """What each branch that may stand in a family has for a law, and its number among those that differ."""
-    free, numbers, found = _free(network), dict[object, int](), Laws({}, {})
+    free, numbers, found = _free(network), dict[object, int](), FamilyLaws({}, {})
     for b in network.branches:
         shape = shape_of(b.law, b.name) if b.name in free else None
         if shape is not None:
@@ -78,14 +78,14 @@ def _free(network: Network) -> set[str]:
     }
 
 
-def side_by_side(network: Network, laws: Laws) -> Found:
+def side_by_side(network: Network, laws: FamilyLaws) -> Found:
     """Families of nodes that runs of branches go along, and these runs."""
     sites, runs = _whole(network, laws, _sites(network, laws))
     used = {site[0] for run in runs for site in run.ends if site[1] >= 0}
     return {n: s for n, s in sites.items() if s[0] in used}, runs
 
 
-def _sites(network: Network, laws: Laws) -> dict[str, Site]:
+def _sites(network: Network, laws: FamilyLaws) -> dict[str, Site]:
     """Where each node stands: among those of its connected part that ends of the same branches touch."""
     parts = Joined[str]()
     touched: dict[str, list[int]] = {}
@@ -111,7 +111,7 @@ def _sites(network: Network, laws: Laws) -> dict[str, Site]:
     return {name: site for name, site in found.items() if size[site[0]] >= RUN}
 
 
-def _whole(network: Network, laws: Laws, sites: dict[str, Site]) -> Found:
+def _whole(network: Network, laws: FamilyLaws, sites: dict[str, Site]) -> Found:
     """Sites and runs without the families that single branches tear to pieces: these stay as they are written."""
     for _ in range(ROUNDS):
         runs = list(_runs(network, laws, sites))
@@ -122,7 +122,7 @@ def _whole(network: Network, laws: Laws, sites: dict[str, Site]) -> Found:
     return {}, []
 
 
-def _fragmented_families(network: Network, sites: dict[str, Site], runs: Sequence[Run]) -> set[str]:
+def _fragmented_families(network: Network, sites: dict[str, Site], runs: Sequence[BranchSequence]) -> set[str]:
     """Families of which alike neighbours are fewer than SHORT on the average."""
     cuts: dict[str, set[int]] = {}
     # where a run begins or ends a family is cut
@@ -140,7 +140,7 @@ def _fragmented_families(network: Network, sites: dict[str, Site], runs: Sequenc
     return {family for family, number in size.items() if SHORT * len(cuts.get(family, ())) > number + SHORT}
 
 
-def _runs(network: Network, laws: Laws, sites: dict[str, Site]) -> Iterator[Run]:
+def _runs(network: Network, laws: FamilyLaws, sites: dict[str, Site]) -> Iterator[BranchSequence]:
     """Branches of one law whose ends go along their families by one, or stay."""
 
     def site(end: Terminal | None) -> Site:
@@ -166,7 +166,7 @@ def _runs(network: Network, laws: Laws, sites: dict[str, Site]) -> Iterator[Run]
             if k - first >= RUN:
                 own = found[first:k]
                 members = tuple((b, laws.shapes[b.name]) for _, _, b, _ in own)
-                yield Run(members, own[0][3], (own[0][0] >= 0, own[0][1] >= 0))
+                yield BranchSequence(members, own[0][3], (own[0][0] >= 0, own[0][1] >= 0))
             first = k
 
 

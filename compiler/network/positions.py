@@ -9,13 +9,13 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
 
-from sysdyn.compiler.network.primal.bounds import Sizes
+from sysdyn.compiler.network.primal.bounds import WholeNumbers
 from sysdyn.compiler.network.primal.cycles import in_loops
 from sysdyn.compiler.network.quadratures import Wanted, is_position, quadrature, stores_of, whole
 from sysdyn.dsl.model import expression as ex
+from sysdyn.dsl.model.connected_components import Joined
 from sysdyn.dsl.model.expression import Node
-from sysdyn.dsl.model.joined import Joined
-from sysdyn.dsl.model.network import Initial, Loop, Network, NodeFamily, State, Terminal
+from sysdyn.dsl.model.network import InitialCondition, Loop, Network, NodeFamily, State, Terminal
 from sysdyn.dsl.model.rewriting import TRACED, expressions, rewritten
 from sysdyn.dsl.text.diagnostics import ModelError, Place
 from sysdyn.values import dataclass
@@ -27,7 +27,7 @@ _GROUND = "", ()
 
 def from_stores(network: Network) -> Network:
     """Traced positions of points that single stores hold to the ground, as displacements of these stores."""
-    sizes, over = Sizes(network), dict[_Point | None, Node]({_GROUND: ex.const(0.0)})
+    sizes, over = WholeNumbers(network), dict[_Point | None, Node]({_GROUND: ex.const(0.0)})
     springs = [j for j in _springs(network, frozenset()) if not j.loops]
     left = [(_point(j.plus, sizes), _point(j.minus, sizes), j.content) for j in springs]
     number = 0
@@ -52,7 +52,7 @@ def _positions(roots: Sequence[Node]) -> list[Node]:
     return [n for n in ex.topological(roots) if n.op == "var" and n.data[1:] == ("nq", 0)]
 
 
-def _point(end: Terminal, sizes: Sizes) -> _Point | None:
+def _point(end: Terminal, sizes: WholeNumbers) -> _Point | None:
     """A single point; None where its indices are not known."""
     if end.node is None:
         return _GROUND
@@ -103,9 +103,9 @@ def with_positions(network: Network, wanted: frozenset[Wanted]) -> Network:
     def position(end: Terminal) -> Node:
         return ex.const(0.0) if end.node is None else ex.var(f"{end.node}.start", "start", *end.at)
 
-    def initial_of(join: _Join) -> Initial:
+    def initial_of(join: _Join) -> InitialCondition:
         apart = ex.sub(position(join.plus), position(join.minus))
-        return Initial(ex.sub(join.content, apart), ex.const(0.0), True, join.loops, join.place, join.name)
+        return InitialCondition(ex.sub(join.content, apart), ex.const(0.0), True, join.loops, join.place, join.name)
 
     def substitute_positions(root: Node) -> Node:
         found = _positions([root])

@@ -22,9 +22,17 @@ from dataclasses import replace
 from typing import Any
 
 from sysdyn.compiler.network.dead_branches import dead_branches
-from sysdyn.compiler.network.influence import EVERYTHING, Link, Quantity, influences_on, links, quantities, read_by
+from sysdyn.compiler.network.influence import (
+    EVERYTHING,
+    InfluenceLink,
+    Quantity,
+    influences_on,
+    links,
+    quantities,
+    read_by,
+)
 from sysdyn.dsl.model.expression import add, variables
-from sysdyn.dsl.model.network import Energy, Network, Observation
+from sysdyn.dsl.model.network import EnergyTerm, Network, Observation
 from sysdyn.dsl.model.rewriting import nodes_read
 from sysdyn.values import dataclass
 
@@ -101,7 +109,7 @@ def _requested_quantities(network: Network) -> frozenset[Quantity]:
     return frozenset() if EVERYTHING in found else found
 
 
-def _remove(network: Network, found: Sequence[Link], gone: frozenset[Quantity]) -> Network:
+def _remove(network: Network, found: Sequence[InfluenceLink], gone: frozenset[Quantity]) -> Network:
     """The network as if these quantities, and the statements that are theirs, had not been written."""
     away = {id(link.item) for link in found if link.piece is None and link.goes(gone)}
 
@@ -140,9 +148,9 @@ def _read(speed: Observation) -> set[str]:
     return {speed.name} | {str(n.data[0]) for n in variables(speed.expression) if n.op == "var"}
 
 
-def _energies(found: Sequence[Link], gone: frozenset[Quantity]) -> Iterator[Energy]:
+def _energies(found: Sequence[InfluenceLink], gone: frozenset[Quantity]) -> Iterator[EnergyTerm]:
     """Each state function with the summands that are left of it."""
-    pieces: dict[int, list[Link]] = {}
+    pieces: dict[int, list[InfluenceLink]] = {}
     for link in found:
         if link.piece is not None:
             pieces.setdefault(id(link.item), []).append(link)
@@ -158,7 +166,7 @@ def _energies(found: Sequence[Link], gone: frozenset[Quantity]) -> Iterator[Ener
 
 
 def _parts(
-    network: Network, found: Sequence[Link], kept: frozenset[Quantity], gone: frozenset[Quantity]
+    network: Network, found: Sequence[InfluenceLink], kept: frozenset[Quantity], gone: frozenset[Quantity]
 ) -> Iterator[Removal]:
     """The connected parts of what goes, in the order of the text."""
     head = {q: q for q in gone}

@@ -10,7 +10,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 from dataclasses import replace
 
-from sysdyn.compiler.network.primal.bounds import Box, Sizes, box_difference
+from sysdyn.compiler.network.primal.bounds import Box, WholeNumbers, box_difference
 from sysdyn.compiler.network.primal.overlaps import ranges_of
 from sysdyn.dsl.model import expression as ex
 from sysdyn.dsl.model.expression import Node
@@ -135,7 +135,7 @@ def whole(node: NodeFamily) -> tuple[tuple[Loop, ...], tuple[Node, ...]]:
 
 def massive(network: Network) -> frozenset[str]:
     """Families of common-flow nodes on each of which a mass stands."""
-    sizes = Sizes(network)
+    sizes = WholeNumbers(network)
     found: dict[str, list[Box]] = {}
     for b in network.branches:
         alone = b.minus is None or b.minus.node is None

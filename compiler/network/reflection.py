@@ -16,13 +16,13 @@ from dataclasses import replace
 
 from sysdyn.compiler.network.along import along
 from sysdyn.compiler.network.complements import complements
+from sysdyn.compiler.network.floating_parts import add_references
 from sysdyn.compiler.network.positions import from_stores, with_positions
 from sysdyn.compiler.network.primal.reading import KINDS
 from sysdyn.compiler.network.quadratures import from_masses, massive, with_quadratures
-from sysdyn.compiler.network.stated import ALL, as_elements
 from sysdyn.compiler.network.sticking import as_relations
 from sysdyn.compiler.network.ties import as_transformers
-from sysdyn.compiler.network.ungrounded import add_references
+from sysdyn.compiler.network.written_energies import ALL, as_elements
 from sysdyn.dsl.model import expression as ex
 from sysdyn.dsl.model.expression import Node
 from sysdyn.dsl.model.network import (

@@ -11,11 +11,11 @@ from __future__ import annotations
 from collections.abc import Container, Iterator, Mapping
 from dataclasses import replace
 
-from sysdyn.compiler.network.stated import element
+from sysdyn.compiler.network.written_energies import element
 from sysdyn.dsl.model import expression as ex
 from sysdyn.dsl.model.calculus import derivative
 from sysdyn.dsl.model.expression import Node
-from sysdyn.dsl.model.network import Branch, Constraint, Energy, Network, Switch, Unknown, loop_indices
+from sysdyn.dsl.model.network import Branch, Constraint, EnergyTerm, Network, Switch, Unknown, loop_indices
 from sysdyn.dsl.model.rewriting import EXPRESSIONS, expressions, rewritten
 from sysdyn.dsl.model.units import NONE, Unit, si
 
@@ -127,7 +127,7 @@ def _between_nodes(network: Network, row: Constraint) -> Network:
     return network
 
 
-def _without_friction(energy: Energy, senses: set[str]) -> Node:
+def _without_friction(energy: EnergyTerm, senses: set[str]) -> Node:
     """A content without its friction: the terms with one of these senses."""
     found = [n for n in ex.topological([energy.expression]) if n.op == "param" and n.data in senses]
     return ex.substitute(energy.expression, dict.fromkeys(found, ex.const(0.0))) if found else energy.expression

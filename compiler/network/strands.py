@@ -13,8 +13,8 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Collection, Iterator, Mapping, Sequence
 
-from sysdyn.compiler.network.neighbourhoods import RUN, Found, Laws, Run, Site
-from sysdyn.dsl.model.joined import Joined
+from sysdyn.compiler.network.neighbourhoods import RUN, BranchSequence, FamilyLaws, Found, Site
+from sysdyn.dsl.model.connected_components import Joined
 from sysdyn.dsl.model.network import Branch, Network
 from sysdyn.values import dataclass
 
@@ -45,7 +45,7 @@ class Strands:
 class _Graph:
     """Branches that may stand in families: loose; free: nodes that may, with their domains."""
 
-    def __init__(self, network: Network, laws: Laws, taken: Collection[str]) -> None:
+    def __init__(self, network: Network, laws: FamilyLaws, taken: Collection[str]) -> None:
         told = {i.target.data[0] for i in network.initials if i.target.op == "var" and i.target.data[1] == "ne"}
         self.free = {
             n.name: n.domain.name
@@ -111,7 +111,7 @@ def _end(b: Branch, sense: bool) -> str | None:
     return end.node
 
 
-def in_strands(network: Network, laws: Laws, kept: Found) -> Found:
+def in_strands(network: Network, laws: FamilyLaws, kept: Found) -> Found:
     """What stands in families already, and strands in others: joints go on by one, buses are picked."""
     found = strands(network, laws, {b.name for run in kept[1] for b, _ in run.members} | set(kept[0]))
     buses = {name: (f"bus {key}", k) for key, names in found.buses.items() for k, name in enumerate(names)}
@@ -125,11 +125,11 @@ def in_strands(network: Network, laws: Laws, kept: Found) -> Found:
             one, two = (joints.get(n or "", buses.get(n or "", (n or "", -1))) for n in nodes)
             moves, picked = ((nodes[0] in of, nodes[1] in of) for of in (joints, buses))
             members = tuple((b, laws.shapes[b.name]) for b, _ in (strand.branches[j] for strand in same))
-            runs.append(Run(members, (one, two), moves, picked))
+            runs.append(BranchSequence(members, (one, two), moves, picked))
     return {**kept[0], **buses, **joints}, [*kept[1], *runs]
 
 
-def strands(network: Network, laws: Laws, taken: Collection[str]) -> Strands:
+def strands(network: Network, laws: FamilyLaws, taken: Collection[str]) -> Strands:
     """Classes of at least RUN strands; taken: names of nodes and branches that stand in families already."""
     graph = _Graph(network, laws, taken)
     ways = list(graph.strands())

@@ -25,7 +25,7 @@ from sysdyn.dsl.model.network import (
     Constraint,
     Coupling,
     Domain,
-    Initial,
+    InitialCondition,
     Network,
     NodeFamily,
     Terminal,
@@ -115,7 +115,7 @@ def _with_junction(
         return ex.substitute(root, {n: ex.neg(ex.var(others[0][0], "be", *n.args)) for n in read}) if read else root
 
     # a displacement constraint holds at the start too
-    begun = (Initial(c.expression, ex.const(0.0), True, c.loops, c.place),) if c.kind == "phi" else ()
+    begun = (InitialCondition(c.expression, ex.const(0.0), True, c.loops, c.place),) if c.kind == "phi" else ()
     kept = tuple(branches.get(b.name, b) for b in network.branches)
     network = rewritten(replace(network, branches=kept), multipliers_as_efforts)
     return replace(

@@ -11,12 +11,12 @@ from collections import Counter
 from collections.abc import Callable, Sequence
 
 from sysdyn.compiler.forms.descriptor import DescriptorForm
-from sysdyn.compiler.model.integers import Reference
+from sysdyn.compiler.model.integers import FamilyReference
 from sysdyn.compiler.model.mirror import word
 from sysdyn.compiler.program.emit_c_rolled import Rolled
 from sysdyn.compiler.program.emit_c_support import APART, HEAD, SUPPORT, TURNS
 from sysdyn.compiler.program.notation import Notation, bound, factors, number, position, total
-from sysdyn.compiler.program.program import Assign, Fold, Operand, Program, Routine, Statement, Store
+from sysdyn.compiler.program.program import Assign, Fold, Operand, Program, Routine, Statement, StoreInstruction
 from sysdyn.compiler.program.sharing import share_operations
 
 C = Notation("sqrt", "pow", "sd_whole", "INFINITY", "NAN")
@@ -99,7 +99,7 @@ class _Angles:
 
 def _printer(routine: Routine) -> Callable[[Sequence[Statement]], str]:
     """Lines of statements of a routine that is no loop."""
-    writer = _Writer(routine, {})
+    writer = _CWriter(routine, {})
     return lambda statements: "\n".join(writer.body(statements, "        "))
 
 
@@ -125,7 +125,7 @@ def _call(k: int, routine: Routine, turned: bool) -> str:
 
 def _inside(routine: Routine, angles: dict[int, int]) -> str:
     """What stands between the braces of a routine's function."""
-    writer = _Writer(routine, angles)
+    writer = _CWriter(routine, angles)
     body = writer.body(writer.angles_first(), "    " * (len(routine.loops) + 1))
     lines = []
     unused = [n for n in ("p", "ix", "at", "to", "t", "y", "yd") if n not in writer.used]
@@ -156,12 +156,12 @@ def _comment(routine: Routine, form: DescriptorForm) -> str:
     return f"{word(form.formulation, routine.block)}, {routine.part}: {', '.join(rows)}{more}"
 
 
-def _stands(place: Reference) -> bool:
+def _stands(place: FamilyReference) -> bool:
     """No loop moves it."""
     return all(index.loop < 0 and index.table < 0 for index in place.indices)
 
 
-class _Writer:
+class _CWriter:
     """Statements of one routine as C; places that no loop enters are computed before the loops."""
 
     def __init__(self, routine: Routine, angles: dict[int, int]) -> None:
@@ -172,7 +172,9 @@ class _Writer:
         self.used: set[str] = {"ix"} if routine.loops else set()
         self.sums: dict[str, str] = {}
         self._names: dict[str, str] = {}
-        stores = [s.place for s in routine.body if isinstance(s, Store) and isinstance(s.place, Reference)]
+        stores = [
+            s.place for s in routine.body if isinstance(s, StoreInstruction) and isinstance(s.place, FamilyReference)
+        ]
         places = {place.family: {other for other in stores if other.family == place.family} for place in stores}
         alone = {family: found.pop() for family, found in places.items() if routine.loops and len(found) == 1}
         self._summed = {family for family, place in alone.items() if _stands(place)}
@@ -191,7 +193,7 @@ class _Writer:
                     lines.append(f"{indent}const {kind} a{s.target} = {self.value(s)};")
                 case Fold():
                     lines += self.fold(s, indent)
-                case Store():
+                case StoreInstruction():
                     lines.append(indent + self.store(s))
         return lines
 
@@ -218,10 +220,10 @@ class _Writer:
             lines.insert(0, f"const sd_turn *const w{k} = sd_turned(w + {k}, {_operand(s.args[0])});")
         return lines
 
-    def store(self, s: Store) -> str:
+    def store(self, s: StoreInstruction) -> str:
         """r[place] += value, or v[entry] = value."""
         value = _operand(s.value)
-        if isinstance(s.place, Reference):
+        if isinstance(s.place, FamilyReference):
             place = f"r[{self.place(s.place, 'to')}]"
             return f"{self._sum(place) if s.place.family in self._summed else place} += {value};"
         return f"v[{s.place}] = {value};"
@@ -247,7 +249,7 @@ class _Writer:
         inner = self.body(s.body, indent + "    ")
         return [f"{indent}double {a} = {start};", indent + head, *inner, f"{indent}    {step}", indent + "}"]
 
-    def place(self, place: Reference, table: str) -> str:
+    def place(self, place: FamilyReference, table: str) -> str:
         """The position of an element in y, yd (table at) or r (table to)."""
         self.used.add(table)
         fixed, moving = position(place, f"{table}[{place.family}]", _loop, True)

@@ -9,14 +9,14 @@ from __future__ import annotations
 from collections.abc import Callable, Container, Iterable, Iterator, Sequence
 from itertools import groupby
 
-from sysdyn.compiler.program.program import ROWS_A_ROUTINE, Program, Routine, Statement, Store
-from sysdyn.compiler.program.rolled import (
+from sysdyn.compiler.program.program import ROWS_A_ROUTINE, Program, Routine, Statement, StoreInstruction
+from sysdyn.compiler.program.rerolling import (
     ALIKE,
     LARGE,
     SHARED,
     TERMS,
-    Group,
-    Sum,
+    AlikeTexts,
+    LongSum,
     as_long_sum,
     group,
     normalize_signs,
@@ -62,7 +62,7 @@ class Rolled:
                     continue
                 printed = printer(routine)
                 # several terms into one place: the order of the sum is kept
-                if any(isinstance(s, Store) and s.place in sums for s in routine.body):
+                if any(isinstance(s, StoreInstruction) and s.place in sums for s in routine.body):
                     self._in_order(k, routine, outputs, printed)
                 else:
                     single[k] = [skeleton(printed(output)) for output in outputs]
@@ -78,7 +78,7 @@ class Rolled:
             if len(found) >= SHARED:
                 self._write_shared(program, out, group(key, [numbers for _, numbers in found]), [k for k, _ in found])
 
-    def _write_shared(self, program: Program, out: str, alike: Group, numbers: list[int]) -> None:
+    def _write_shared(self, program: Program, out: str, alike: AlikeTexts, numbers: list[int]) -> None:
         """Write one function for loops that are alike but for numbers, and a call with its tables for each of them."""
         name = f"g{len(self.texts)}"
         head, tables = self._table_names(alike)
@@ -132,7 +132,7 @@ class Rolled:
             body.append("\n".join(["    {", *lines, printed([found.store]).replace("a-1", "s"), "    }"]))
         self.calls[k] = (self._function(routine, "long sums", body, tables),)
 
-    def _terms(self, found: Sum, printed: Printed) -> Iterator[tuple[str, list[str]]]:
+    def _terms(self, found: LongSum, printed: Printed) -> Iterator[tuple[str, list[str]]]:
         """Terms of a long sum as text: alike neighbours as turns of a loop, others one by one."""
         split = []
         for c, statements in found.terms:
@@ -146,11 +146,11 @@ class Rolled:
             else:
                 yield from ((_block(group(key, [numbers]).text), []) for numbers in rows)
 
-    def _write_turns(self, routine: Routine, alike: Group) -> str:
+    def _write_turns(self, routine: Routine, alike: AlikeTexts) -> str:
         text, tables = self._turns(alike)
         return self._function(routine, f"{alike.count} that are alike", [text], tables)
 
-    def _turns(self, alike: Group) -> tuple[str, list[str]]:
+    def _turns(self, alike: AlikeTexts) -> tuple[str, list[str]]:
         """A loop through the tables of a group, and these."""
         head, tables = self._table_names(alike)
         lines = [f"    const {_KINDS[letter]} *restrict {letter} = {table};" for letter, (table, _) in head.items()]
@@ -158,7 +158,7 @@ class Rolled:
         lines += [f"    for (int turn = 0; turn < {alike.count}; ++turn{steps}) {{", alike.text, "    }"]
         return "\n".join(["    {", *lines, "    }"]), tables
 
-    def _table_names(self, alike: Group) -> tuple[dict[str, tuple[str, int]], list[str]]:
+    def _table_names(self, alike: AlikeTexts) -> tuple[dict[str, tuple[str, int]], list[str]]:
         """Names and widths of a group's tables by their letter in its text, and their texts."""
         head, tables = {}, []
         for letter, rows in (("n", alike.whole), ("d", alike.real)):

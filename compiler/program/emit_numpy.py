@@ -9,10 +9,10 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from sysdyn.compiler.forms.descriptor import DescriptorForm
-from sysdyn.compiler.model.integers import Element, Reference
+from sysdyn.compiler.model.integers import ArrayElement, FamilyReference
 from sysdyn.compiler.model.mirror import word
 from sysdyn.compiler.program.notation import Notation, bound, factors, number, position, total
-from sysdyn.compiler.program.program import Assign, Fold, Operand, Program, Routine, Statement, Store
+from sysdyn.compiler.program.program import Assign, Fold, Operand, Program, Routine, Statement, StoreInstruction
 
 NUMPY = Notation("np.sqrt", "np.power", "_whole", "np.inf", "np.nan")
 
@@ -110,7 +110,7 @@ _START = {"sum": "0.0", "prod": "1.0", "min": "np.inf", "max": "-np.inf"}
 
 def emit_numpy(program: Program, form: DescriptorForm, head: str = HEAD, first: int = 0) -> str:
     """The Python text of a program; first: number of its first function, behind those of a text before it."""
-    texts = [_Writer(k, r).text(form) for k, r in enumerate(program.routines, first)]
+    texts = [_NumpyWriter(k, r).text(form) for k, r in enumerate(program.routines, first)]
     blocks = [_block(name, part, program, first) for name in program.blocks() for part in ("rows", "dy", "dyd")]
     return "\n\n".join([head, *texts, *(b for b in blocks if b)])
 
@@ -123,7 +123,7 @@ def _loop(k: int) -> str:
     return f"i{k}"
 
 
-class _Writer:
+class _NumpyWriter:
     """One routine as a Python function."""
 
     def __init__(self, k: int, routine: Routine) -> None:
@@ -179,14 +179,14 @@ class _Writer:
                     lines.append(f"{indent}a{s.target} = {self.value(s)}")
                 case Fold():
                     lines += self.fold(s, indent)
-                case Store():
+                case StoreInstruction():
                     lines.append(indent + self.store(s))
         return lines
 
-    def store(self, s: Store) -> str:
+    def store(self, s: StoreInstruction) -> str:
         """r[place] += value, or the column of an entry."""
         value = _operand(s.value)
-        if not isinstance(s.place, Reference):
+        if not isinstance(s.place, FamilyReference):
             return f"v[:, {s.place}] = {value}" if self.depth else f"v[o + {s.place}] = {value}"
         where, kind = self.where(s.place, f"to[{s.place.family}]")
         if kind == "array" and self._has_distinct_places(s.place):
@@ -197,14 +197,14 @@ class _Writer:
             return f"r[{where}] += np.sum(np.broadcast_to({value}, (n,)))"
         return f"r[{where}] += {value}"
 
-    def _has_distinct_places(self, place: Reference) -> bool:
+    def _has_distinct_places(self, place: FamilyReference) -> bool:
         """Whether no two iterations have one place: each loop moves an index of its own."""
         if any(index.table >= 0 for index in place.indices):
             return False
         moved = [index.loop for index in place.indices if index.loop >= 0]
         return sorted(moved) == list(range(self.depth))
 
-    def where(self, place: Reference | Element, head: str) -> tuple[str, str]:
+    def where(self, place: FamilyReference | ArrayElement, head: str) -> tuple[str, str]:
         """The index text of a place and whether it is a scalar, a slice or an array."""
         fixed, moving = position(place, head, _loop, True)
         if not moving:

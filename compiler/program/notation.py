@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Sequence
 
-from sysdyn.compiler.model.integers import Element, Index, Reference
+from sysdyn.compiler.model.integers import ArrayElement, FamilyReference, Index
 from sysdyn.values import dataclass
 
 LARGEST_POWER = 64  # whole powers up to this are multiplications; beyond, pow: as exact, and no longer
@@ -65,7 +65,9 @@ def _power(base: str, exponent: float, notation: Notation) -> str:
     return f"{notation.power}({base}, {number(exponent, notation)})"
 
 
-def position(place: Reference | Element, head: str, loop: Callable[[int], str], scaled: bool) -> tuple[str, str]:
+def position(
+    place: FamilyReference | ArrayElement, head: str, loop: Callable[[int], str], scaled: bool
+) -> tuple[str, str]:
     """(part that no loop variable enters, part with loop variables) of a place in y, r or p."""
     fixed = [head] if head else []
     # the family's first place

@@ -10,8 +10,8 @@ from __future__ import annotations
 
 from typing import Any
 
-from sysdyn.compiler.forms.descriptor import WITHOUT_ENTRIES, Block, DescriptorForm, Kernel
-from sysdyn.compiler.model.integers import Index, Integers, Reference, Slot
+from sysdyn.compiler.forms.descriptor import WITHOUT_ENTRIES, Block, DescriptorForm, LoopKernel
+from sysdyn.compiler.model.integers import FamilyReference, Index, Integers, Slot
 from sysdyn.compiler.model.terms import Nest, is_affine, is_constant
 from sysdyn.dsl.model.calculus import derivative
 from sysdyn.dsl.model.expression import Node, is_const, linear, topological, variables
@@ -49,14 +49,14 @@ class Fold:
 
 
 @dataclass(frozen=True, slots=True)
-class Store:
+class StoreInstruction:
     """r[place] += value, or v[place] = value."""
 
-    place: Reference | int
+    place: FamilyReference | int
     value: Operand
 
 
-Statement = Assign | Fold | Store
+Statement = Assign | Fold | StoreInstruction
 
 
 @dataclass(frozen=True, slots=True)
@@ -73,16 +73,16 @@ class Routine:
 
 
 @dataclass(frozen=True, slots=True)
-class Pattern:
+class KernelPattern:
     """What one kernel adds to: its loops, rows, and the places of its entries; families of unknowns that it reads and
     whose rates it reads; row families to which it adds anything but constants and constants times unknowns; those to
     which it adds anything whose slopes change.
     """
 
     loops: tuple[tuple[Index, Index], ...]
-    rows: tuple[Reference, ...]
-    dy: tuple[tuple[Reference, Reference], ...]
-    dyd: tuple[tuple[Reference, Reference], ...]
+    rows: tuple[FamilyReference, ...]
+    dy: tuple[tuple[FamilyReference, FamilyReference], ...]
+    dyd: tuple[tuple[FamilyReference, FamilyReference], ...]
     reads: tuple[int, ...]
     rates: tuple[int, ...]
     curved: tuple[int, ...]
@@ -94,7 +94,7 @@ class Program:
     """The whole module: routines by block and part, patterns by block, slots of ix."""
 
     routines: tuple[Routine, ...]
-    patterns: tuple[tuple[str, tuple[Pattern, ...]], ...]
+    patterns: tuple[tuple[str, tuple[KernelPattern, ...]], ...]
     slots: tuple[Slot, ...]
     scalars: tuple[str, ...]  # scalar parameters in the order of p
     tables: tuple[str, ...]
@@ -105,7 +105,7 @@ class Program:
 
 
 @dataclass(frozen=True, slots=True)
-class _Entry:
+class _PatternEntry:
     row: int
     column: Node
     value: Node
@@ -138,33 +138,35 @@ class Programmer:
             return self.integers.index(node, loops)
         return Index(-1, self.integers.value(node), 0)
 
-    def reference(self, column: Node, loops: dict[str, int]) -> Reference:
+    def reference(self, column: Node, loops: dict[str, int]) -> FamilyReference:
         """The place of an unknown."""
         owner, kind, _ = column.data
         return self.integers.reference(self.families[owner, kind], owner, column.args, loops)
 
-    def kernel(self, block: str, number: int, kernel: Kernel) -> Pattern:
+    def kernel(self, block: str, number: int, kernel: LoopKernel) -> KernelPattern:
         """Routines and pattern of one kernel."""
         loops = {f"#{k}": k for k in range(len(kernel.nest))}
         bounds = self.bounds(kernel.nest)
         places = tuple(self.integers.reference(s.row, self.form.rows[s.row].owner, s.at, loops) for s in kernel.rows)
         rows = [s.row for s in kernel.rows]
         pieces = [(k, piece) for k, s in enumerate(kernel.rows) for piece in _pieces(s.expression)]
-        stores: list[tuple[Reference | int, Node]] = [(places[k], piece) for k, piece in pieces]
+        stores: list[tuple[FamilyReference | int, Node]] = [(places[k], piece) for k, piece in pieces]
         self._cut((block, "rows", number), bounds, stores, [rows[k] for k, _ in pieces], 0)
-        found: dict[str, tuple[tuple[Reference, Reference], ...]] = {"dy": (), "dyd": ()}
+        found: dict[str, tuple[tuple[FamilyReference, FamilyReference], ...]] = {"dy": (), "dyd": ()}
         bent: set[int] = set()
         for part, order in (("dy", 0), ("dyd", 1)):
             entries = [] if block in WITHOUT_ENTRIES else _entries(kernel, order)
             found[part] = tuple((places[e.row], self.reference(e.column, loops)) for e in entries)
-            numbered: list[tuple[Reference | int, Node]] = [(k, e.value) for k, e in enumerate(entries)]
+            numbered: list[tuple[FamilyReference | int, Node]] = [(k, e.value) for k, e in enumerate(entries)]
             self._cut((block, part, number), bounds, numbered, [rows[e.row] for e in entries], len(entries))
             bent.update(rows[e.row] for e in entries if not is_constant(e.value, self.changing))
         unknowns = {n.data for s in kernel.rows for n in variables(s.expression) if n.op == "var"}
         read = [sorted({self.families[owner, kind] for owner, kind, of in unknowns if of == k}) for k in (0, 1)]
         curved = sorted({s.row for s in kernel.rows if not is_affine(s.expression, self.changing)})
         reads, rates = (tuple(families) for families in read)
-        return Pattern(bounds, places, found["dy"], found["dyd"], reads, rates, tuple(curved), tuple(sorted(bent)))
+        return KernelPattern(
+            bounds, places, found["dy"], found["dyd"], reads, rates, tuple(curved), tuple(sorted(bent))
+        )
 
     def formula(self, block: str, number: int, nest: Nest, expression: Node) -> None:
         """One value an iteration, in the order of the iterations (formulas.py)."""
@@ -174,7 +176,7 @@ class Programmer:
         self,
         what: tuple[str, str, int],
         bounds: tuple[tuple[Index, Index], ...],
-        outputs: list[tuple[Reference | int, Node]],
+        outputs: list[tuple[FamilyReference | int, Node]],
         rows: list[int],
         entries: int,
     ) -> None:
@@ -201,7 +203,7 @@ def _pieces(root: Node) -> list[Node]:
     return [linear(0.0 if k else constant, parts[k : k + TERMS_A_PIECE]) for k in cuts]
 
 
-def _entries(kernel: Kernel, order: int) -> list[_Entry]:
+def _entries(kernel: LoopKernel, order: int) -> list[_PatternEntry]:
     """The structurally nonzero derivatives by unknowns (order 0) or their rates (order 1)."""
     found = []
     for k, summand in enumerate(kernel.rows):
@@ -210,7 +212,7 @@ def _entries(kernel: Kernel, order: int) -> list[_Entry]:
             if column.data[1] != "audit":
                 value = derivative(summand.expression, column)
                 if not is_const(value, 0.0):
-                    found.append(_Entry(k, column, value))
+                    found.append(_PatternEntry(k, column, value))
     return found
 
 
@@ -225,10 +227,10 @@ class _Body:
         self.statements: list[Statement] = []
         self.values: dict[Node, Operand] = {}
 
-    def store(self, place: Reference | int, root: Node) -> None:
+    def store(self, place: FamilyReference | int, root: Node) -> None:
         """Compute and store one output."""
         self.statements += self._compute(root, self.values)
-        self.statements.append(Store(place, self.values[root]))
+        self.statements.append(StoreInstruction(place, self.values[root]))
 
     def _compute(self, root: Node, values: dict[Node, Operand]) -> list[Assign | Fold]:
         """Assignments for what is not known yet; values of reductions' bodies stay in their own scope."""
@@ -302,5 +304,5 @@ def program(form: DescriptorForm, scalars: tuple[str, ...]) -> Program:
     return Program(tuple(programmer.routines), patterns, programmer.integers.slots, scalars, tuple(programmer.tables))
 
 
-def _patterns(programmer: Programmer, block: Block) -> tuple[Pattern, ...]:
+def _patterns(programmer: Programmer, block: Block) -> tuple[KernelPattern, ...]:
     return tuple(programmer.kernel(block.name, k, kernel) for k, kernel in enumerate(block.kernels))

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from sysdyn.compiler.model.integers import Element, Index, Reference
-from sysdyn.compiler.program.program import Assign, Fold, Operand, Program, Statement, Store
+from sysdyn.compiler.model.integers import ArrayElement, FamilyReference, Index
+from sysdyn.compiler.program.program import Assign, Fold, Operand, Program, Statement, StoreInstruction
 
 
 def verify_program(program: Program) -> None:
@@ -13,11 +13,11 @@ def verify_program(program: Program) -> None:
     for routine in program.routines:
         depth = len(routine.loops)
         _verify_body(routine.body, set(), set(), depth, len(program.slots))
-        stores = [s.place for s in routine.body if isinstance(s, Store)]
+        stores = [s.place for s in routine.body if isinstance(s, StoreInstruction)]
         pattern = patterns[routine.block][routine.kernel]
         assert pattern.loops == routine.loops, "loops of a routine and of its pattern"
         if routine.part == "rows":
-            assert all(isinstance(place, Reference) for place in stores)
+            assert all(isinstance(place, FamilyReference) for place in stores)
             continue
         key = (routine.block, routine.part, routine.kernel)
         written.setdefault(key, []).extend(place for place in stores if isinstance(place, int))
@@ -31,9 +31,9 @@ def _verify_body(body: tuple[Statement, ...], known: set[int], taken: set[int], 
     for statement in body:
         match statement:
             # stores a value in scope; assigns none
-            case Store():
+            case StoreInstruction():
                 _verify_operands((statement.value,), known)
-                if isinstance(statement.place, Reference):
+                if isinstance(statement.place, FamilyReference):
                     _verify_indices(statement.place.indices, depth, slots)
                 continue
             # its body sees what is outside, and hides what it assigns
@@ -44,7 +44,7 @@ def _verify_body(body: tuple[Statement, ...], known: set[int], taken: set[int], 
                 _verify_operands((statement.value,), inner)
             case Assign():
                 _verify_operands(statement.args, known)
-                if isinstance(statement.data, Reference | Element):
+                if isinstance(statement.data, FamilyReference | ArrayElement):
                     _verify_indices(statement.data.indices, depth, slots)
         assert statement.target not in taken, f"value {statement.target} is assigned twice"
         taken.add(statement.target)
@@ -79,13 +79,13 @@ def _show_body(body: tuple[Statement, ...], indent: str) -> list[str]:
     lines = []
     for s in body:
         match s:
-            case Store():
+            case StoreInstruction():
                 lines.append(f"{indent}{_place('out', s.place)} <- {_operand(s.value)}")
             case Fold():
                 lines.append(f"{indent}%{s.target} = {s.operator} for i{s.loop} in {_text(s.first)}..{_text(s.last)}")
                 lines += [*_show_body(s.body, indent + "  "), f"{indent}  {_operand(s.value)}"]
             case Assign():
-                data = _place("", s.data) if isinstance(s.data, Reference | Element) else str(s.data or "")
+                data = _place("", s.data) if isinstance(s.data, FamilyReference | ArrayElement) else str(s.data or "")
                 args = ", ".join(map(_operand, s.args))
                 lines.append(f"{indent}%{s.target} = {s.op} {data} {args}".rstrip())
     return lines
@@ -102,8 +102,8 @@ def _text(index: Index) -> str:
     return text if index.table < 0 else f"ix[ix[{index.table}] + {text}]"
 
 
-def _place(head: str, place: Reference | Element | int) -> str:
+def _place(head: str, place: FamilyReference | ArrayElement | int) -> str:
     if isinstance(place, int):
         return f"{head}[{place}]"
-    family = place.family if isinstance(place, Reference) else f"ix[{place.origin}]"
+    family = place.family if isinstance(place, FamilyReference) else f"ix[{place.origin}]"
     return f"{head}{family}[{', '.join(_text(i) for i in place.indices)}]"

@@ -14,7 +14,7 @@ from collections.abc import Iterable, Sequence
 from dataclasses import replace
 from typing import Any
 
-from sysdyn.compiler.program.program import Assign, Fold, Operand, Routine, Statement, Store
+from sysdyn.compiler.program.program import Assign, Fold, Operand, Routine, Statement, StoreInstruction
 
 POWER = 3
 """The largest whole power that is written as products (notation.py)."""
@@ -57,7 +57,7 @@ class _Scaled:
                 self.body.append(s)
             case Assign():
                 self.body.append(replace(s, args=tuple(map(self._whole, s.args))))
-            case Store():
+            case StoreInstruction():
                 self.body.append(replace(s, value=self._whole(s.value)))
             # a fold reads values under their own numbers
             case Fold():
@@ -224,7 +224,7 @@ def _read(s: Statement) -> set[int]:
             read: Iterable[Operand] = s.args
         case Fold():
             read = (s.value, *(a for inner in s.body for a in _read(inner)))
-        case Store():
+        case StoreInstruction():
             read = (s.value,)
     return {a for a in read if isinstance(a, int)}
 
@@ -242,7 +242,7 @@ def _drop_unused(body: Sequence[Statement]) -> tuple[Statement, ...]:
     found: list[Statement] = []
     used: set[int] = set()
     for s in reversed(body):
-        if isinstance(s, Store) or s.target in used:
+        if isinstance(s, StoreInstruction) or s.target in used:
             used |= _read(s)
             found.append(s)
     return tuple(reversed(found))

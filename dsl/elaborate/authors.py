@@ -25,7 +25,7 @@ def point_at_author(elaborator: Elaborator, found: Iterable[Diagnostic]) -> Iter
 def _point_at_author(elaborator: Elaborator, d: Diagnostic) -> Diagnostic:
     """The finding at the author's own text, where a component of the library has its place."""
     assert d.place is not None
-    spaces = [s for s, _ in elaborator.bodies if s.path and _contains(elaborator, s, d.place)]
+    spaces = [s for s, _ in elaborator.instances.bodies if s.path and _contains(elaborator, s, d.place)]
     meant = [s for s in spaces if s.path == d.place.element]
     named = [s for s in spaces if re.search(rf"(?<![\w.]){re.escape(s.path)}(?![\w])", d.message)]
     for space in (*meant, *sorted(named, key=lambda s: -len(s.path)), *spaces):
@@ -40,7 +40,7 @@ def _contains(elaborator: Elaborator, space: Space, place: Place) -> bool:
     """Whether a place lies in the text of a space's component."""
     if space.source != place.source:
         return False
-    body = next(body for s, body in elaborator.bodies if s is space)
+    body = next(body for s, body in elaborator.instances.bodies if s is space)
     spans = [statement.span for statement, _ in body]
     return any(span.start <= place.span.start and place.span.end <= span.end for span in spans)
 
@@ -48,12 +48,12 @@ def _contains(elaborator: Elaborator, space: Space, place: Place) -> bool:
 def _author(elaborator: Elaborator, space: Space) -> Place | None:
     """The statement in the author's file that a space comes from."""
     labels = [label.partition("[")[0] for label in space.path.split(".")]
-    inner: syntax.Instance | None = None
+    inner: syntax.InstanceStatement | None = None
     for depth, label in enumerate(labels):
         around = ".".join(labels[:depth])
-        for outer, body in elaborator.bodies:
+        for outer, body in elaborator.instances.bodies:
             if outer.source is elaborator.source and without_indices(outer.path) == around:
-                made = [s for s, _ in body if isinstance(s, syntax.Instance) and s.decl.name == label]
+                made = [s for s, _ in body if isinstance(s, syntax.InstanceStatement) and s.decl.name == label]
                 inner = made[0] if made else inner
     return None if inner is None else Place(elaborator.source, inner.span)
 

@@ -46,7 +46,7 @@ _Declared = syntax.UnitAlias | syntax.UnitBase
 def _written_in(unit: _Declared) -> list[str]:
     """The names of the units in which an alias is written."""
     quantities = walk(unit.value) if isinstance(unit, syntax.UnitAlias) else ()
-    return [f.name for q in quantities if isinstance(q, syntax.Quantity) for f in q.unit.factors]
+    return [f.name for q in quantities if isinstance(q, syntax.QuantityLiteral) for f in q.unit.factors]
 
 
 @cache
@@ -105,7 +105,7 @@ class FileScope:
         # statements that could not be read: the names in them are declared, if wrongly, so that their uses are no
         # errors of their own
         for item in file.items:
-            if isinstance(item, syntax.Broken):
+            if isinstance(item, syntax.BrokenStatement):
                 scope.broken |= item.names
                 if "std" in item.names:  # an import that could not be read: what hangs on it is not reported again
                     scope.broken |= {name for name, module in library_components().items() if module in item.names}
@@ -190,20 +190,20 @@ class FileScope:
         """The names that a top-level item declares."""
         match item:
             # effort, flow and what a node has in common
-            case syntax.Domain():
+            case syntax.DomainDefinition():
                 yield from self._domain(item, scope, source)
             # a model may be used as a component of another one
-            case syntax.Component() | syntax.Model():
+            case syntax.ComponentDefinition() | syntax.ModelDefinition():
                 yield ComponentSymbol(item.name.name, item.body, scope, source, Place(source, item.name.span))
             # resolved where it is read first, in the scope of its own file
-            case syntax.Const():
+            case syntax.ConstDefinition():
                 span = item.name.span
                 place = Place(source, span)
                 space = Space("", scope, scope, source)
                 yield Definition(item.name.name, "const", item.value, (), None, space, place, span)
-            case syntax.Function():
+            case syntax.FunctionDefinition():
                 yield FunctionSymbol(item, source, scope, Place(source, item.name.span))
-            case syntax.Table():
+            case syntax.TableDefinition():
                 yield from self._table(item, scope, source)
             # the symbols of another file, entered as if they were declared here
             case syntax.Import():
@@ -284,7 +284,7 @@ class FileScope:
         self._modules[path] = scope
         return scope
 
-    def _domain(self, item: syntax.Domain, scope: Scope, source: SourceText) -> Iterator[Symbol]:
+    def _domain(self, item: syntax.DomainDefinition, scope: Scope, source: SourceText) -> Iterator[Symbol]:
         """A domain from its roles: units of effort, flow, momentum, displacement, and what is common at a node."""
         units: dict[str, Unit] = {}
         common, pseudo, before = "effort", None, len(self.report)
@@ -301,7 +301,7 @@ class FileScope:
                     pseudo = read_unit(part.unit, scope, source, self.report)
         place = Place(source, item.name.span)
         missing = [k for k in ("effort", "flow", "displacement") if k not in units]
-        unread = len(self.report) > before or any(isinstance(part, syntax.Broken) for part in item.body)
+        unread = len(self.report) > before or any(isinstance(part, syntax.BrokenStatement) for part in item.body)
         # effort, flow and displacement have no default; a role that was misread is reported already
         if missing and not unread:
             self.report.error("E210", f"domain {item.name.name}: its {missing[0]} is not given", place)
@@ -331,7 +331,7 @@ class FileScope:
                 message = f"domain {name}: {integral} is not the time integral of {rate} ({edge} edge: {letter})"
                 self.report.error(code, message, place, help=f"its unit should be {dim.show(wanted)}")
 
-    def _table(self, item: syntax.Table, scope: Scope, source: SourceText) -> Iterator[Symbol]:
+    def _table(self, item: syntax.TableDefinition, scope: Scope, source: SourceText) -> Iterator[Symbol]:
         """A table with its data, checked when it is read."""
         sized = next((p for p in item.params if p.size is not None), None)
         if sized is not None:

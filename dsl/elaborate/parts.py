@@ -19,11 +19,11 @@ from sysdyn.dsl.model.network import (
     Coupling,
     Derived,
     Dynamic,
-    Energy,
+    EnergyTerm,
     Event,
     Expectation,
     Golden,
-    Initial,
+    InitialCondition,
     Loop,
     NodeFamily,
     Observation,
@@ -32,7 +32,7 @@ from sysdyn.dsl.model.network import (
     State,
     Switch,
     Unknown,
-    Work,
+    VirtualWork,
 )
 from sysdyn.dsl.model.units import Unit
 from sysdyn.dsl.model.values import Values
@@ -44,7 +44,7 @@ from sysdyn.dsl.text.diagnostics import Place, Related, Report
 from sysdyn.dsl.tree import syntax
 from sysdyn.values import dataclass
 
-Nested = tuple[syntax.Statement, tuple[syntax.For, ...]]
+Nested = tuple[syntax.Statement, tuple[syntax.ForStatement, ...]]
 
 
 @dataclass(slots=True)
@@ -89,11 +89,11 @@ class NetworkBuilder:
     coordinates: list[Coordinate] = field(default_factory=list)
     unknowns: list[Unknown] = field(default_factory=list)
     states: list[State] = field(default_factory=list)
-    energies: list[Energy] = field(default_factory=list)
-    works: list[Work] = field(default_factory=list)
+    energies: list[EnergyTerm] = field(default_factory=list)
+    works: list[VirtualWork] = field(default_factory=list)
     constraints: list[Constraint] = field(default_factory=list)
     dynamics: list[Dynamic] = field(default_factory=list)
-    initials: list[Initial] = field(default_factory=list)
+    initials: list[InitialCondition] = field(default_factory=list)
     expectations: list[Expectation] = field(default_factory=list)
     goldens: list[Golden] = field(default_factory=list)
     quasis: list[str] = field(default_factory=list)
@@ -111,7 +111,9 @@ class NetworkBuilder:
     inputs: dict[str, tuple[Unit, Place]] = field(default_factory=dict)  # of the model, which a scene may set
     given: set[str] = field(default_factory=set)  # states that have a dynamic, sound or not
     derived: list[Derived] = field(default_factory=list)  # what is differentiated by time
-    owned: dict[str, list[Energy | Work | Constraint]] = field(default_factory=dict)  # by the path of their instance
+    owned: dict[str, list[EnergyTerm | VirtualWork | Constraint]] = field(
+        default_factory=dict
+    )  # by the path of their instance
 
 
 class _Entered:
@@ -203,7 +205,7 @@ class ElaborationContext:
                     self.in_parts(do, span)
 
     @contextmanager
-    def inside(self, loops: tuple[syntax.For, ...]) -> Iterator[None]:
+    def inside(self, loops: tuple[syntax.ForStatement, ...]) -> Iterator[None]:
         """Bring the variables of `for` statements into sight."""
         with ExitStack() as stack:
             for loop in loops:
@@ -216,9 +218,13 @@ class ElaborationContext:
         """A span of the present text."""
         return Place(self.resolver.source, span)
 
-    def add_statement(self, statement: Energy | Work | Constraint) -> None:
+    def source_text(self, span: syntax.Span) -> str:
+        """The author's text of a span on one line."""
+        return " ".join(self.resolver.source.text[span.start : span.end].split())
+
+    def add_statement(self, statement: EnergyTerm | VirtualWork | Constraint) -> None:
         """Takes in what the present model or instance says."""
-        kinds: dict[type, list[Any]] = {Energy: self.parts.energies, Work: self.parts.works}
+        kinds: dict[type, list[Any]] = {EnergyTerm: self.parts.energies, VirtualWork: self.parts.works}
         kinds.get(type(statement), self.parts.constraints).append(statement)
         if self.current.path:
             self.parts.owned.setdefault(self.current.path, []).append(statement)
@@ -234,7 +240,7 @@ class ElaborationContext:
             self.report.error("E106", f"'{symbol.name}' is declared twice", symbol.place, related=related)
             raise Failed
 
-    def unit(self, unit: syntax.Unit) -> Unit:
+    def unit(self, unit: syntax.UnitExpression) -> Unit:
         """The value of a unit as written."""
         found = read_unit(unit, self.scope, self.resolver.source, self.report)
         if found is None:
@@ -294,10 +300,10 @@ class ElaborationContext:
         return {n: inside[n] for n in ex.topological([node]) if n in inside}
 
 
-def flatten(body: Sequence[syntax.Statement], loops: tuple[syntax.For, ...] = ()) -> Iterator[Nested]:
+def flatten(body: Sequence[syntax.Statement], loops: tuple[syntax.ForStatement, ...] = ()) -> Iterator[Nested]:
     """The statements of a body with the `for` statements around each."""
     for statement in body:
-        if isinstance(statement, syntax.For):
+        if isinstance(statement, syntax.ForStatement):
             yield from flatten(statement.body, (*loops, statement))
         else:
             yield statement, loops

@@ -25,7 +25,7 @@ Row = tuple[float, ...]
 
 
 def read_table(
-    item: syntax.Table, units: Sequence[Unit], result: Unit, source: SourceText, report: Report
+    item: syntax.TableDefinition, units: Sequence[Unit], result: Unit, source: SourceText, report: Report
 ) -> Table | None:
     """The table's breakpoints and values; None after reporting E206."""
     name = item.name.name
@@ -65,7 +65,7 @@ def _grid_problem(rows: list[Row], arguments: int, interpolation: str) -> str | 
     return None
 
 
-def _written(item: syntax.Table, units: list[Unit], source: SourceText, report: Report) -> list[Row]:
+def _written(item: syntax.TableDefinition, units: list[Unit], source: SourceText, report: Report) -> list[Row]:
     """Rows of a table in the text, in base units; Failed after reporting E206 of a row of another length."""
     rows = []
     for row in item.rows or ():
@@ -79,7 +79,7 @@ def _written(item: syntax.Table, units: list[Unit], source: SourceText, report: 
     return rows
 
 
-def _from_file(item: syntax.Table, units: list[Unit], source: SourceText, report: Report) -> list[Row]:
+def _from_file(item: syntax.TableDefinition, units: list[Unit], source: SourceText, report: Report) -> list[Row]:
     """Rows of a table's file, in base units; Failed after reporting E206. One line of names above the numbers is passed
     over.
     """

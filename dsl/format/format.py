@@ -102,7 +102,7 @@ class _Formatter:
             self._block(node, body, indent)
         elif self._has_comments(node.span.end):
             self._verbatim(node.span, indent)
-        elif isinstance(node, s.Table) and node.rows is not None:
+        elif isinstance(node, s.TableDefinition) and node.rows is not None:
             self._table(node, node.rows, indent)
         else:
             self.lines.extend(fill(statement_pieces(node), indent))
@@ -153,7 +153,7 @@ class _Formatter:
                 return position
             position = self.comments[number].span.end
 
-    def _table(self, node: s.Table, rows: Sequence[s.Row], indent: int) -> None:
+    def _table(self, node: s.TableDefinition, rows: Sequence[s.TableRow], indent: int) -> None:
         """A table with its rows, on one line if the author has it so and it fits."""
         head = statement_pieces(node)
         single = "".join(head) + " [ " + ", ".join(map(row_text, rows)) + " ]"
@@ -177,11 +177,19 @@ class _Formatter:
 
 def _body_of(node: Any) -> Sequence[Any] | None:
     """The statements of a node's block; None where it has no block."""
-    if isinstance(node, s.When | s.Every):
+    if isinstance(node, s.WhenStatement | s.EveryStatement):
         return node.actions
-    if isinstance(node, s.Bundle):
+    if isinstance(node, s.BundleDefinition):
         return node.members
-    if isinstance(node, s.Domain | s.Component | s.Model | s.Scene | s.For | s.Level):
+    if isinstance(
+        node,
+        s.DomainDefinition
+        | s.ComponentDefinition
+        | s.ModelDefinition
+        | s.SceneDefinition
+        | s.ForStatement
+        | s.LevelStatement,
+    ):
         return node.body
     return None
 
@@ -190,13 +198,13 @@ def _head_end(node: Any) -> int:
     """An offset between the parts of a statement's head and its `{`."""
     # the last part of the head: `for i in 1..n {`, `when x > 0 {`, `every 10 ms {`, `scene s of m {`
     match node:
-        case s.For():
+        case s.ForStatement():
             return node.upper.span.end
-        case s.When():
+        case s.WhenStatement():
             return node.condition.span.end
-        case s.Every():
+        case s.EveryStatement():
             return node.period.span.end
-        case s.Scene():
+        case s.SceneDefinition():
             return node.model.span.end
         # component, model, level, ...: their names
         case _:
@@ -208,7 +216,7 @@ def _on_one_line(node: Any) -> str | None:
     """A statement with its block on one line; None where that cannot be."""
     body = _body_of(node)
     if body is None:
-        if isinstance(node, s.Table):
+        if isinstance(node, s.TableDefinition):
             return None
         text = "".join(statement_pieces(node))
         return text if len(text) <= WIDTH else None

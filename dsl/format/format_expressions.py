@@ -34,7 +34,7 @@ def format_expression(expr: s.Expr | s.Range) -> str:
     return "".join(pieces(expr))
 
 
-def format_unit(unit: s.Unit) -> str:
+def format_unit(unit: s.UnitExpression) -> str:
     """The canonical text of a unit: as written, without spaces."""
     return unit.text
 
@@ -65,7 +65,7 @@ def pieces(expr: s.Expr | s.Range) -> list[str]:
         if _LEVELS.get(type(node), _ATOM) < level:
             stack.extend((")", (node, _CONDITIONAL), "("))
             continue
-        if isinstance(node, s.Quantity):
+        if isinstance(node, s.QuantityLiteral):
             out.append(f"{node.text} {format_unit(node.unit)}")
             after_unit = True
             continue
@@ -95,7 +95,7 @@ def _number(e: s.Number) -> list[Part]:
     return [e.text]
 
 
-def _quantity(e: s.Quantity) -> list[Part]:
+def _quantity(e: s.QuantityLiteral) -> list[Part]:
     return [f"{e.text} {format_unit(e.unit)}"]
 
 
@@ -131,11 +131,11 @@ def _arg(e: s.Arg) -> list[Part]:
     return [(e.value, _CONDITIONAL)] if e.name is None else [f"{e.name} = ", (e.value, _CONDITIONAL)]
 
 
-def _call(e: s.Call) -> list[Part]:
+def _call(e: s.FunctionCall) -> list[Part]:
     return [e.name + "(", *comma_list((arg, _CONDITIONAL) for arg in e.args), ")"]
 
 
-def _method(e: s.Method) -> list[Part]:
+def _method(e: s.MethodCall) -> list[Part]:
     return [(e.base, _ATOM), f".{e.name}(", *comma_list((arg, _CONDITIONAL) for arg in e.args), ")"]
 
 
@@ -209,13 +209,13 @@ def _array(e: s.Array) -> list[Part]:
     return ["[", *comma_list((item, _CONDITIONAL) for item in e.items), "]"]
 
 
-def _group(e: s.Group) -> list[Part]:
+def _group(e: s.Parenthesized) -> list[Part]:
     return ["(", (e.expr, _CONDITIONAL), ")"]
 
 
 _PARTS: dict[type[Any], Callable[[Any], list[Part]]] = {
     s.Number: _number,
-    s.Quantity: _quantity,
+    s.QuantityLiteral: _quantity,
     s.Text: _text,
     s.Bool: _bool,
     s.Name: _name,
@@ -224,8 +224,8 @@ _PARTS: dict[type[Any], Callable[[Any], list[Part]]] = {
     s.Range: _range,
     s.Prime: _prime,
     s.Arg: _arg,
-    s.Call: _call,
-    s.Method: _method,
+    s.FunctionCall: _call,
+    s.MethodCall: _method,
     s.Reduction: _reduction,
     s.Sum: _sum,
     s.Product: _product,
@@ -237,5 +237,5 @@ _PARTS: dict[type[Any], Callable[[Any], list[Part]]] = {
     s.Not: _not,
     s.Conditional: _conditional,
     s.Array: _array,
-    s.Group: _group,
+    s.Parenthesized: _group,
 }

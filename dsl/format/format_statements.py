@@ -19,7 +19,7 @@ def statement_pieces(node: Any) -> Pieces:
     return _PIECES[type(node)](node)
 
 
-def row_text(row: s.Row) -> str:
+def row_text(row: s.TableRow) -> str:
     """One row of a table."""
     return "(" + ", ".join(number.text for number in row.numbers) + ")"
 
@@ -51,12 +51,12 @@ def _after(text: str, expr: s.Expr | None) -> Pieces:
     return [] if expr is None else [text, *pieces(expr)]
 
 
-def _of_unit(unit: s.Unit | None) -> Pieces:
+def _of_unit(unit: s.UnitExpression | None) -> Pieces:
     """An optional unit behind a colon."""
     return [] if unit is None else [": ", format_unit(unit)]
 
 
-def _initial(initial: s.Initial | None) -> Pieces:
+def _initial(initial: s.InitialValue | None) -> Pieces:
     """An optional initial value."""
     if initial is None:
         return []
@@ -80,12 +80,12 @@ def _optional_name(name: s.Word | None) -> str:
     return "" if name is None else " " + name.name
 
 
-def _parameters(params: Sequence[s.Parameter]) -> Pieces:
+def _parameters(params: Sequence[s.FormalParameter]) -> Pieces:
     """The head of a function or table."""
     return ["(", *_comma_list(_parameter(item) for item in params), ")"]
 
 
-def _parameter(item: s.Parameter) -> Pieces:
+def _parameter(item: s.FormalParameter) -> Pieces:
     """One argument of a function or table."""
     size = [] if item.size is None else ["[", *pieces(item.size), "]"]
     return [item.name, *size, ": ", format_unit(item.unit)]
@@ -103,12 +103,12 @@ def _member(n: s.BundleMember) -> Pieces:
     return [*_comma_list([word.name] for word in n.names), ": ", n.domain.name]
 
 
-def _function(n: s.Function) -> Pieces:
+def _function(n: s.FunctionDefinition) -> Pieces:
     head = [f"fn {n.name.name}", *_parameters(n.params), " -> ", format_unit(n.result)]
     return [*head, *_after(" = ", n.value)]
 
 
-def _table(n: s.Table) -> Pieces:
+def _table(n: s.TableDefinition) -> Pieces:
     """All of a table but its rows."""
     outside = "" if n.extrapolation is None else " " + n.extrapolation
     head = [f"table {n.name.name}", *_parameters(n.params), " -> "]
@@ -116,30 +116,30 @@ def _table(n: s.Table) -> Pieces:
     return [*head, f"{format_unit(n.result)} {n.interpolation}{outside}{source}"]
 
 
-def _param(n: s.Param) -> Pieces:
+def _param(n: s.ParamStatement) -> Pieces:
     return ["param ", *_decl(n.decl), *_of_unit(n.unit), *_after(" = ", n.value)]
 
 
-def _node(n: s.Node) -> Pieces:
+def _node(n: s.NodeStatement) -> Pieces:
     return ["node ", *_decls(n.decls), ": ", n.domain.name, *_initial(n.init)]
 
 
-def _branch(n: s.Branch) -> Pieces:
+def _branch(n: s.BranchStatement) -> Pieces:
     return [*(["branch ", *_decls(n.decls)] if n.decls else ["branch"]), ": ", n.domain.name]
 
 
-def _coord(n: s.Coord) -> Pieces:
+def _coord(n: s.CoordStatement) -> Pieces:
     tangible = {None: "", True: " tangible", False: " intangible"}[n.tangible]
     return [n.kind + " ", *_decls(n.decls), ": ", n.domain.name + tangible, *_initial(n.init)]
 
 
-def _constraint(n: s.Constraint) -> Pieces:
+def _constraint(n: s.ConstraintStatement) -> Pieces:
     guards = [piece for guard in n.guards for piece in (f" {guard.kind} ", *pieces(guard.expr))]
     sides = [*pieces(n.left), f" {n.relation} ", *pieces(n.right)]
     return [n.kind + " ", *_decl(n.decl), ": ", *sides, *guards]
 
 
-def _expect(n: s.Expect) -> Pieces:
+def _expect(n: s.ExpectStatement) -> Pieces:
     moment = [] if n.moment is None else [n.moment + ": "]
     if n.at is not None:
         moment = ["at ", *pieces(n.at), ": "]
@@ -147,7 +147,7 @@ def _expect(n: s.Expect) -> Pieces:
     return ["expect ", *moment, *sides, *_after(" within ", n.within)]
 
 
-def _instance(n: s.Instance) -> Pieces:
+def _instance(n: s.InstanceStatement) -> Pieces:
     head = [*_decl(n.decl), ": ", ".".join(n.component.names), *_args(n.args)]
     connections = _comma_list(_connection(item) for item in n.connections)
     return [*head, *([" ", *connections] if connections else [])]
@@ -168,7 +168,7 @@ def _connection(n: s.Connection) -> Pieces:
             return pieces(node)
 
 
-def _trace(n: s.Trace) -> Pieces:
+def _trace(n: s.TraceStatement) -> Pieces:
     items = (
         [*pieces(i.expr), *([] if i.unit is None else [" in ", format_unit(i.unit)]), *_alias(i.alias)] for i in n.items
     )
@@ -179,69 +179,69 @@ def _alias(alias: s.Word | None) -> Pieces:
     return [] if alias is None else [" as ", alias.name]
 
 
-def _accuracy(n: s.Accuracy) -> Pieces:
+def _accuracy(n: s.AccuracyStatement) -> Pieces:
     on = [" on ", *_comma_list(pieces(item) for item in n.on)] if n.on else []
     return ["accuracy ", *pieces(n.value), *on, *([" relative to range"] if n.to_range else [])]
 
 
-def _level(n: s.Level) -> Pieces:
+def _level(n: s.LevelStatement) -> Pieces:
     extends = "" if n.extends is None else " extends " + n.extends.name
     return [f"level {n.name.name}{extends}{' default' if n.default else ''}"]
 
 
 _PIECES: dict[type[Any], Callable[[Any], Pieces]] = {
     s.Import: _import,
-    s.Domain: lambda n: [f"domain {n.name.name}"],
+    s.DomainDefinition: lambda n: [f"domain {n.name.name}"],
     s.DomainRole: _role,
     s.DomainNode: lambda n: [f"node common {n.common}"],
     s.DomainGround: lambda n: [f'ground "{n.text}"'],
     s.DomainPseudo: lambda n: ["pseudo: ", format_unit(n.unit)],
-    s.Bundle: lambda n: [f"bundle {n.name.name}"],
+    s.BundleDefinition: lambda n: [f"bundle {n.name.name}"],
     s.BundleMember: _member,
     s.UnitAlias: lambda n: [f"unit {n.name.name}", *_after(" = ", n.value)],
     s.UnitBase: lambda n: [f"unit {n.name.name} base"],
-    s.Const: lambda n: [f"const {n.name.name}", *_after(" = ", n.value)],
-    s.Function: _function,
-    s.Table: _table,
-    s.Component: lambda n: [f"component {n.name.name}"],
-    s.Model: lambda n: [f"model {n.name.name}"],
-    s.Scene: lambda n: [f"scene {n.name.name} of {'.'.join(n.model.names)}"],
-    s.Param: _param,
-    s.Node: _node,
-    s.Port: lambda n: ["port ", *_decls(n.decls), ": ", n.domain.name],
-    s.Branch: _branch,
-    s.Input: lambda n: ["input ", *_decl(n.decl), *_of_unit(n.unit), *_after(" = ", n.value)],
-    s.Output: lambda n: ["output ", *_decl(n.decl), *_after(" = ", n.value)],
-    s.Quasi: lambda n: ["quasi ", *_decl(n.decl), *_of_unit(n.unit), *_after(" = ", n.value)],
-    s.Coord: _coord,
-    s.Implicit: lambda n: ["implicit ", *_decls(n.decls), *_of_unit(n.unit), *_initial(n.init)],
-    s.State: lambda n: ["state ", *_decl(n.decl), *_of_unit(n.unit), *_after(" = ", n.value)],
-    s.Discrete: lambda n: ["discrete ", *_decl(n.decl), *_of_unit(n.unit), *_after(" = ", n.value)],
-    s.Dynamic: lambda n: ["dynamic ", *pieces(n.target), *_after(" = ", n.value)],
-    s.Let: lambda n: ["let ", *_decl(n.decl), *_after(" = ", n.value)],
-    s.Law: lambda n: ["law ", *pieces(n.left), *_after(" = ", n.right)],
-    s.Energy: lambda n: [f"energy {n.function}{_optional_name(n.name)}", *_after(" = ", n.value)],
-    s.Content: lambda n: [f"content {n.function}{_optional_name(n.name)}", *_after(" = ", n.value)],
-    s.Work: lambda n: ["work ", *pieces(n.effort), *_after(" on ", n.on)],
-    s.Constraint: _constraint,
-    s.Init: lambda n: ["init ", *pieces(n.target), *_initial(n.initial)],
-    s.When: lambda n: ["when ", *pieces(n.condition)],
-    s.Every: lambda n: ["every ", *pieces(n.period)],
-    s.Action: lambda n: [*pieces(n.target), *_after(" := ", n.value)],
-    s.For: lambda n: [f"for {n.index.name} in ", *pieces(n.lower), "..", *pieces(n.upper)],
-    s.Level: _level,
-    s.Require: lambda n: ["require ", *pieces(n.condition)],
-    s.Expect: _expect,
-    s.Golden: lambda n: [f'expect golden "{n.file}"', *_after(" within ", n.within)],
-    s.Lossless: lambda n: ["lossless"],
-    s.Instance: _instance,
-    s.Time: lambda n: ["time ", *pieces(n.start), *_after(" to ", n.stop)],
-    s.Set: lambda n: ["set ", *pieces(n.target), *_after(" = ", n.value)],
-    s.SceneLevel: lambda n: ["level ", *pieces(n.target), f" = {n.level.name}"],
-    s.Trace: _trace,
-    s.Accuracy: _accuracy,
-    s.Formulation: lambda n: [f"formulation {n.name.name}"],
-    s.Solver: lambda n: [f"solver {n.name.name}", *_args(n.args)],
-    s.Redundancy: lambda n: [f"redundancy {n.name.name}"],
-    s.Limit: lambda n: [f"limit {n.name.name} ", *pieces(n.value)],
+    s.ConstDefinition: lambda n: [f"const {n.name.name}", *_after(" = ", n.value)],
+    s.FunctionDefinition: _function,
+    s.TableDefinition: _table,
+    s.ComponentDefinition: lambda n: [f"component {n.name.name}"],
+    s.ModelDefinition: lambda n: [f"model {n.name.name}"],
+    s.SceneDefinition: lambda n: [f"scene {n.name.name} of {'.'.join(n.model.names)}"],
+    s.ParamStatement: _param,
+    s.NodeStatement: _node,
+    s.PortStatement: lambda n: ["port ", *_decls(n.decls), ": ", n.domain.name],
+    s.BranchStatement: _branch,
+    s.InputStatement: lambda n: ["input ", *_decl(n.decl), *_of_unit(n.unit), *_after(" = ", n.value)],
+    s.OutputStatement: lambda n: ["output ", *_decl(n.decl), *_after(" = ", n.value)],
+    s.QuasiStatement: lambda n: ["quasi ", *_decl(n.decl), *_of_unit(n.unit), *_after(" = ", n.value)],
+    s.CoordStatement: _coord,
+    s.ImplicitStatement: lambda n: ["implicit ", *_decls(n.decls), *_of_unit(n.unit), *_initial(n.init)],
+    s.StateStatement: lambda n: ["state ", *_decl(n.decl), *_of_unit(n.unit), *_after(" = ", n.value)],
+    s.DiscreteStatement: lambda n: ["discrete ", *_decl(n.decl), *_of_unit(n.unit), *_after(" = ", n.value)],
+    s.DynamicStatement: lambda n: ["dynamic ", *pieces(n.target), *_after(" = ", n.value)],
+    s.LetStatement: lambda n: ["let ", *_decl(n.decl), *_after(" = ", n.value)],
+    s.LawStatement: lambda n: ["law ", *pieces(n.left), *_after(" = ", n.right)],
+    s.EnergyStatement: lambda n: [f"energy {n.function}{_optional_name(n.name)}", *_after(" = ", n.value)],
+    s.ContentStatement: lambda n: [f"content {n.function}{_optional_name(n.name)}", *_after(" = ", n.value)],
+    s.WorkStatement: lambda n: ["work ", *pieces(n.effort), *_after(" on ", n.on)],
+    s.ConstraintStatement: _constraint,
+    s.InitStatement: lambda n: ["init ", *pieces(n.target), *_initial(n.initial)],
+    s.WhenStatement: lambda n: ["when ", *pieces(n.condition)],
+    s.EveryStatement: lambda n: ["every ", *pieces(n.period)],
+    s.ActionStatement: lambda n: [*pieces(n.target), *_after(" := ", n.value)],
+    s.ForStatement: lambda n: [f"for {n.index.name} in ", *pieces(n.lower), "..", *pieces(n.upper)],
+    s.LevelStatement: _level,
+    s.RequireStatement: lambda n: ["require ", *pieces(n.condition)],
+    s.ExpectStatement: _expect,
+    s.GoldenStatement: lambda n: [f'expect golden "{n.file}"', *_after(" within ", n.within)],
+    s.LosslessStatement: lambda n: ["lossless"],
+    s.InstanceStatement: _instance,
+    s.TimeStatement: lambda n: ["time ", *pieces(n.start), *_after(" to ", n.stop)],
+    s.SetStatement: lambda n: ["set ", *pieces(n.target), *_after(" = ", n.value)],
+    s.SceneLevelStatement: lambda n: ["level ", *pieces(n.target), f" = {n.level.name}"],
+    s.TraceStatement: _trace,
+    s.AccuracyStatement: _accuracy,
+    s.FormulationStatement: lambda n: [f"formulation {n.name.name}"],
+    s.SolverStatement: lambda n: [f"solver {n.name.name}", *_args(n.args)],
+    s.RedundancyStatement: lambda n: [f"redundancy {n.name.name}"],
+    s.LimitStatement: lambda n: [f"limit {n.name.name} ", *pieces(n.value)],
 }

@@ -215,7 +215,7 @@ class State:
 
 
 @dataclass(frozen=True, slots=True)
-class Energy:
+class EnergyTerm:
     """One summand of a state function: function is T* T V V* (J) or D G (W).
 
     `kept kinetic`, `kept potential` (J): what stores hold whose laws stand beside the state functions; for the audit.
@@ -228,7 +228,7 @@ class Energy:
 
 
 @dataclass(frozen=True, slots=True)
-class Work:
+class VirtualWork:
     """Virtual work: effort * delta(on), and the account that the audit enters it in: supplied, dissipated or stored.
 
     stored: it is that of a store whose energy the audit counts.
@@ -269,7 +269,7 @@ class Dynamic:
 
 
 @dataclass(frozen=True, slots=True)
-class Initial:
+class InitialCondition:
     """target = value (fixed) or ~ value (a guess) at the start; target may be any expression of the unknowns.
 
     Where target is an unknown itself (var q, f, p, s, e) it pins that unknown; otherwise it is an equation.
@@ -454,11 +454,11 @@ class Network:
     coordinates: tuple[Coordinate, ...]
     unknowns: tuple[Unknown, ...]
     states: tuple[State, ...]
-    energies: tuple[Energy, ...]
-    works: tuple[Work, ...]
+    energies: tuple[EnergyTerm, ...]
+    works: tuple[VirtualWork, ...]
     constraints: tuple[Constraint, ...]
     dynamics: tuple[Dynamic, ...]
-    initials: tuple[Initial, ...]
+    initials: tuple[InitialCondition, ...]
     observations: tuple[Observation, ...]
     expectations: tuple[Expectation, ...]
     statics: tuple[Expectation, ...]  # on static quantities, parameters `static dof` etc.

@@ -104,7 +104,7 @@ class Arithmetic(Context):
         # x^(2 m)
         if exponent.dimension not in (None, NONE):
             help_ = None
-            if isinstance(e.exponent, syntax.Quantity):
+            if isinstance(e.exponent, syntax.QuantityLiteral):
                 number, unit = e.exponent.text, e.exponent.unit.text
                 help_ = f"factors are joined by '*': ^{number}*{unit}; '{number} {unit}' is a quantity"
             raise self.fail("E204", f"the exponent is in {dim.show(exponent.dimension)}", e.exponent.span, help=help_)

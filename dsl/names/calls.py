@@ -32,7 +32,7 @@ Head = tuple[str, Dimension, int | None]
 """An argument in the head of a function or table: its name and dimension, of an array how many elements it has."""
 
 
-class Calls(Context):
+class CallResolver(Context):
     """Functions, tables, reductions and arrays written as lists."""
 
     def _array(self, e: syntax.Array) -> Value:
@@ -107,7 +107,7 @@ class Calls(Context):
                 total = Typed(ex.call(e.op, total.node, value.node), total.dimension)
         return total
 
-    def _call(self, e: syntax.Call) -> Value:
+    def _call(self, e: syntax.FunctionCall) -> Value:
         """A call of a function of the text, a table or a function of the language."""
         for arg in e.args:
             if arg.name is not None:
@@ -143,7 +143,7 @@ class Calls(Context):
             raise self.fail("E101", f"unknown function '{e.name}'", e.span, help=help_)
         return self._builtin(e)
 
-    def _builtin(self, e: syntax.Call) -> Value:
+    def _builtin(self, e: syntax.FunctionCall) -> Value:
         """A function of the language: its arguments counted, their dimensions checked."""
         name = e.name
         count, _ = dim.FUNCTIONS[name]
@@ -178,7 +178,7 @@ class Calls(Context):
 
     def _hint_of_division(self, e: object) -> str | None:
         """What is meant by a quantity whose last unit is a variable in sight too: `300 K/T` is not divided by it."""
-        if not isinstance(e, syntax.Quantity) or len(e.unit.factors) < 2:
+        if not isinstance(e, syntax.QuantityLiteral) or len(e.unit.factors) < 2:
             return None
         last = e.unit.factors[-1]
         if last.op != "/" or last.exponent != 1 or self.scope.find(last.name) is None:
@@ -201,7 +201,7 @@ class Calls(Context):
             help_ = f"an angle: {name}({text}*t)" if "pi" in text else f"an angle: {name}(2*pi*{text}*t)"
         raise self.fail("E205", f"the argument of {name} is in {dim.show(dimension)}", e.span, help=help_)
 
-    def _vector_call(self, e: syntax.Call) -> Value:
+    def _vector_call(self, e: syntax.FunctionCall) -> Value:
         """dot, cross, norm: of vectors of one length."""
         wanted = 1 if e.name == "norm" else 2
         values = [self.resolve(a.value) for a in e.args]
@@ -223,7 +223,7 @@ class Calls(Context):
             return total
         return Typed(ex.sqrt(total.node), None if total.dimension is None else dim.square_root(total.dimension))
 
-    def _arguments(self, name: str, heads: Sequence[Head], e: syntax.Call) -> list[Value]:
+    def _arguments(self, name: str, heads: Sequence[Head], e: syntax.FunctionCall) -> list[Value]:
         """Values of the arguments of a function of the text, each of its parameter's dimension and size (E206)."""
         if len(heads) != len(e.args):
             wants = f"{len(heads)} argument{'s' * (len(heads) != 1)}"
@@ -246,13 +246,13 @@ class Calls(Context):
             values.append(Vector(tuple(Typed(node, dimension) for node in items)))
         return values
 
-    def _table(self, symbol: TableSymbol, e: syntax.Call) -> Value:
+    def _table(self, symbol: TableSymbol, e: syntax.FunctionCall) -> Value:
         heads = [(name, dimension, None) for name, dimension in symbol.arguments]
         nodes = _nodes(self._arguments(symbol.name, heads, e))
         at = [ex.table(name, node) for name, node in zip(symbol.held, nodes, strict=False)] or nodes
         return Typed(ex.table(symbol.key, *at), symbol.result)
 
-    def _function(self, symbol: FunctionSymbol, e: syntax.Call) -> Value:
+    def _function(self, symbol: FunctionSymbol, e: syntax.FunctionCall) -> Value:
         """A function of the text: its body with the arguments in place; E105 where it calls itself."""
         definition, name = symbol.definition, symbol.name
         units = [read_unit(p.unit, symbol.file_scope, symbol.source, self.report) for p in definition.params]
@@ -274,7 +274,7 @@ class Calls(Context):
             raise Failed  # reported where it was first applied to these
         return Typed(node, result.dimension)
 
-    def _size(self, parameter: syntax.Parameter, symbol: FunctionSymbol) -> int | None:
+    def _size(self, parameter: syntax.FormalParameter, symbol: FunctionSymbol) -> int | None:
         """How many elements an argument has; None of one number."""
         if parameter.size is None:
             return None

@@ -123,7 +123,9 @@ class Context:
         self._derived: dict[
             tuple[Definition, bool], dict[Node, tuple[tuple[Loop, ...], Place]]
         ] = {}  # in each of these
-        self._applied: dict[tuple[syntax.Function, tuple[Node, ...]], Node | None] = {}  # functions to arguments
+        self._applied: dict[
+            tuple[syntax.FunctionDefinition, tuple[Node, ...]], Node | None
+        ] = {}  # functions to arguments
         self._active: list[Definition] = []
         self._loops: list[Loop] = []
         self._bound: dict[str, Value] = {}  # loop variables, function arguments, an element's own variables

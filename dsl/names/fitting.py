@@ -55,7 +55,7 @@ def missing(sight: Sight, have: Dimension | None, want: Dimension | None, *withi
         return without[0]
     # a literal: the unit that it needs
     for e, wanted in zip(within, (want, have), strict=False):
-        if isinstance(e.operand if isinstance(e, syntax.Negative) else e, (syntax.Number, syntax.Quantity)):
+        if isinstance(e.operand if isinstance(e, syntax.Negative) else e, (syntax.Number, syntax.QuantityLiteral)):
             return in_unit(e, wanted)
     # a parameter in sight that has the missing dimension
     for factor in (dim.quotient(want, have), dim.quotient(have, want)):
@@ -83,10 +83,10 @@ def _hint_of_division(sight: Sight, expression: syntax.Expr, factor: Dimension) 
     while stack:
         e = stack.pop()
         stack += children(e)
-        last = e.unit.factors[-1] if isinstance(e, syntax.Quantity) and len(e.unit.factors) > 1 else None
+        last = e.unit.factors[-1] if isinstance(e, syntax.QuantityLiteral) and len(e.unit.factors) > 1 else None
         if last is None or last.op != "/" or last.exponent != 1:
             continue
-        assert isinstance(e, syntax.Quantity)
+        assert isinstance(e, syntax.QuantityLiteral)
         symbol, unit = sight.scope.find(last.name), find_unit(last.name)
         own = symbol.dimension if isinstance(symbol, (ParameterSymbol, UnknownSymbol)) and not symbol.shape else None
         if own and unit and factor in ((meant := dim.quotient(unit[0], own)), dim.quotient(NONE, meant)):
@@ -152,7 +152,7 @@ _DIVIDED = re.compile(
 )
 
 
-def _dimension(unit: syntax.Unit) -> Dimension | None:
+def _dimension(unit: syntax.UnitExpression) -> Dimension | None:
     """The dimension of a unit that is made of the language's own; None for any other."""
     dimension = NONE
     for factor in unit.factors:
@@ -163,16 +163,16 @@ def _dimension(unit: syntax.Unit) -> Dimension | None:
     return dimension
 
 
-def _quotients(expression: syntax.Expr) -> Iterator[tuple[syntax.Number, syntax.Quantity]]:
+def _quotients(expression: syntax.Expr) -> Iterator[tuple[syntax.Number, syntax.QuantityLiteral]]:
     """Numbers over quantities among the factors of what an expression adds."""
     stack: list[object] = [expression]
     while stack:
         e = stack.pop()
-        if isinstance(e, (syntax.Sum, syntax.Negative, syntax.Group, syntax.Product)):
+        if isinstance(e, (syntax.Sum, syntax.Negative, syntax.Parenthesized, syntax.Product)):
             stack += children(e)
         if isinstance(e, syntax.Product):
             for (_, number), (sign, by) in itertools.pairwise(e.factors):
-                if sign == "/" and isinstance(number, syntax.Number) and isinstance(by, syntax.Quantity):
+                if sign == "/" and isinstance(number, syntax.Number) and isinstance(by, syntax.QuantityLiteral):
                     yield number, by
 
 
@@ -193,7 +193,7 @@ def _rate(sight: Sight, expression: syntax.Expr, factor: Dimension, sense: int) 
             primed.add(sight.written(e.base))
         elif isinstance(e, syntax.Name) and isinstance(sight.scope.find(e.name), UnknownSymbol):
             plain.add(e.name)
-        elif not isinstance(e, (syntax.Member, syntax.Method)):
+        elif not isinstance(e, (syntax.Member, syntax.MethodCall)):
             stack += children(e)
     found = primed if sense > 0 else plain
     # of several nobody can say which is meant
@@ -212,11 +212,11 @@ def bare(sight: Sight, expression: syntax.Expr, *, below: bool = False) -> tuple
     """The one parameter among the factors of an expression, or its divisors (below), that is a bare number: its name
     and that number.
     """
-    if isinstance(expression, (syntax.Quantity, syntax.Number)):
+    if isinstance(expression, (syntax.QuantityLiteral, syntax.Number)):
         return None
     inner: object = expression
     # signs and parentheses around it
-    while isinstance(inner, (syntax.Negative, syntax.Group)):
+    while isinstance(inner, (syntax.Negative, syntax.Parenthesized)):
         inner = inner.operand if isinstance(inner, syntax.Negative) else inner.expr
     single = () if below else (inner,)
     factors = [f for op, f in inner.factors if (op == "/") == below] if isinstance(inner, syntax.Product) else single
@@ -240,9 +240,9 @@ def bare(sight: Sight, expression: syntax.Expr, *, below: bool = False) -> tuple
 def in_unit(number: syntax.Expr, wanted: Dimension) -> str:
     """How a number or a quantity is written in another dimension."""
     inner = number.operand if isinstance(number, syntax.Negative) else number
-    assert isinstance(inner, (syntax.Number, syntax.Quantity))
+    assert isinstance(inner, (syntax.Number, syntax.QuantityLiteral))
     text = f"{'-' if inner is not number else ''}{inner.text}"
-    unit = [f.name for f in inner.unit.factors] if isinstance(inner, syntax.Quantity) else []
+    unit = [f.name for f in inner.unit.factors] if isinstance(inner, syntax.QuantityLiteral) else []
     if wanted == dim.TIME and unit == ["m"] and inner.value:
         return f"write '{text} min', or '{text} s' where seconds are meant"
     if common(wanted) == "K":
@@ -250,9 +250,9 @@ def in_unit(number: syntax.Expr, wanted: Dimension) -> str:
     return f"write '{text} {_keep_prefix(inner, common(wanted))}'" if wanted else f"write '{text}', a number"
 
 
-def _keep_prefix(number: syntax.Number | syntax.Quantity, unit: str) -> str:
+def _keep_prefix(number: syntax.Number | syntax.QuantityLiteral, unit: str) -> str:
     """A unit with the prefix that the quantity was written with, where it bears one: uF of `1 uH`."""
-    names = [factor.name for factor in number.unit.factors] if isinstance(number, syntax.Quantity) else []
+    names = [factor.name for factor in number.unit.factors] if isinstance(number, syntax.QuantityLiteral) else []
     alone = names[0] if len(names) == 1 and names != ["kg"] else ""  # the k of kg says nothing of sizes
     whole, base = (find_unit(name) for name in (alone, alone[1:]))
     prefixed = bool(whole and base and whole[0] == base[0] and whole[1] != base[1] and find_unit(alone[0] + unit))
@@ -262,7 +262,7 @@ def _keep_prefix(number: syntax.Number | syntax.Quantity, unit: str) -> str:
 def fitting_unit(scope: Scope, expression: syntax.Expr, factor: Dimension) -> str | None:
     """The unit with which a parameter of a product fits, or the factor that is missing in it."""
     inner: object = expression
-    while isinstance(inner, (syntax.Negative, syntax.Group)):
+    while isinstance(inner, (syntax.Negative, syntax.Parenthesized)):
         inner = inner.operand if isinstance(inner, syntax.Negative) else inner.expr
     # a parameter alone
     if isinstance(inner, syntax.Name):

@@ -15,7 +15,7 @@ from sysdyn.dsl.names import habits
 from sysdyn.dsl.names.context import Value
 from sysdyn.dsl.names.failures import Failed, NotYetError
 from sysdyn.dsl.names.paths import Located
-from sysdyn.dsl.names.ports import Ports
+from sysdyn.dsl.names.ports import PortResolver
 from sysdyn.dsl.names.quantities import BRANCH, OF_ELEMENTS, branch_words
 from sysdyn.dsl.names.reactions import ledger, reaction
 from sysdyn.dsl.names.symbols import (
@@ -43,7 +43,7 @@ AUDIT = {"energy": dim.ENERGY, "kinetic": dim.ENERGY, "potential": dim.ENERGY, "
 AUDIT |= {"supplied": dim.ENERGY, "constraints": NONE, "drift": NONE}
 
 
-class Members(Ports):
+class Members(PortResolver):
     """Members of what a path leads to."""
 
     # -- elements ------------------------------------------------------------------------------------------
@@ -296,7 +296,7 @@ class Members(Ports):
                 return constraint, ex.substitute(constraint.expression, change)
         raise self.fail("E805", f"'{symbol.name}' has no element [{', '.join(map(str, at))}]", span)
 
-    def _method(self, e: syntax.Method) -> Value:
+    def _method(self, e: syntax.MethodCall) -> Value:
         """`label.on(x)`: the effort of a constraint on a coordinate."""
         base = self.locate(e.base)
         if base is None and isinstance(e.base, syntax.Name) and self.scope.is_broken(e.base.name):

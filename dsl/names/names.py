@@ -64,7 +64,7 @@ def _power_of_ten(scale: Fraction) -> int | None:
     return power if Fraction(10) ** power == scale else None
 
 
-class Names(Context):
+class NameResolver(Context):
     """Names, quantities, elements of arrays, inlined definitions."""
 
     # -- leaves --------------------------------------------------------------------------------------------
@@ -72,7 +72,7 @@ class Names(Context):
     def _number(self, e: syntax.Number) -> Value:
         return Typed(ex.const(e.value), None if e.value == 0.0 else NONE)
 
-    def _quantity(self, e: syntax.Quantity) -> Value:
+    def _quantity(self, e: syntax.QuantityLiteral) -> Value:
         """A number with its unit, in SI."""
         scope = self.scope.declaring
         key = id(scope), len(scope.units), e.text, e.unit.text
@@ -93,7 +93,7 @@ class Names(Context):
             self._quantities[key] = scope, found
         return found
 
-    def _looks_like_division(self, e: syntax.Quantity) -> None:
+    def _looks_like_division(self, e: syntax.QuantityLiteral) -> None:
         """W201: the last unit has the name and the dimension of a variable in sight."""
         last = e.unit.factors[-1]
         if len(e.unit.factors) < 2 or last.op != "/" or last.exponent != 1:
@@ -112,7 +112,7 @@ class Names(Context):
     def _text(self, e: syntax.Text) -> Value:
         raise self.fail("E203", "a text stands where a value is wanted", e.span, help="a number: texts are no values")
 
-    def _group(self, e: syntax.Group) -> Value:
+    def _group(self, e: syntax.Parenthesized) -> Value:
         return self.resolve(e.expr)
 
     def _name(self, e: syntax.Name) -> Value:
@@ -418,7 +418,7 @@ class Names(Context):
     # -- rates ---------------------------------------------------------------------------------------------
 
     def _prime(self, e: syntax.Prime) -> Value:
-        base = e.base.expr if isinstance(e.base, syntax.Group) else e.base
+        base = e.base.expr if isinstance(e.base, syntax.Parenthesized) else e.base
         value = self.resolve(base)
         if isinstance(value, Vector):
             return Vector(tuple(self._rate_of(v, e.span) for v in value.items), value.first)

@@ -13,7 +13,7 @@ from sysdyn.dsl.model import expression as ex
 from sysdyn.dsl.model.expression import Node
 from sysdyn.dsl.names.context import Use, Value
 from sysdyn.dsl.names.failures import Failed, Part, SeveralError
-from sysdyn.dsl.names.names import Names
+from sysdyn.dsl.names.names import NameResolver
 from sysdyn.dsl.names.symbols import BundleNode, InstanceSymbol, Space, Symbol, Typed, Vector
 from sysdyn.dsl.tree import syntax
 from sysdyn.values import dataclass
@@ -31,7 +31,7 @@ class Located:
     change: dict[Node, Node]
 
 
-class Paths(Names):
+class Paths(NameResolver):
     """What a path leads to, and values of what lies inside instances."""
 
     def locate(self, e: syntax.Expr) -> Located | None:

@@ -14,7 +14,7 @@ from sysdyn.dsl.model import expression as ex
 from sysdyn.dsl.model.expression import Node
 from sysdyn.dsl.model.units import Dimension, multiply
 from sysdyn.dsl.names.context import Value
-from sysdyn.dsl.names.quantities import Quantities
+from sysdyn.dsl.names.quantities import QuantityResolver
 from sysdyn.dsl.names.symbols import (
     BundleNode,
     End,
@@ -39,7 +39,7 @@ class _Port(NamedTuple):
     taken: Callable[..., Node]
 
 
-class Ports(Quantities):
+class PortResolver(QuantityResolver):
     """What goes through the ports of instances."""
 
     def taken_in(self, end: End, e: syntax.Member) -> Value:

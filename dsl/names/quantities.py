@@ -35,7 +35,7 @@ def branch_words(domain: Domain) -> tuple[str, ...]:
     return (*(f"{letter} [{unit.text}]" for letter, unit in units.items()), "power [W]", "energy [J]")
 
 
-class Quantities(Paths):
+class QuantityResolver(Paths):
     """What the members of nodes and branches are."""
 
     def _excerpt(self, e: syntax.Expr) -> str:

@@ -9,13 +9,13 @@ from __future__ import annotations
 from collections.abc import Callable
 
 from sysdyn.dsl.names.arithmetic import Arithmetic
-from sysdyn.dsl.names.calls import Calls
+from sysdyn.dsl.names.calls import CallResolver
 from sysdyn.dsl.names.context import Value
 from sysdyn.dsl.names.members import Members
 from sysdyn.dsl.tree import syntax
 
 
-class Resolver(Members, Arithmetic, Calls):
+class Resolver(Members, Arithmetic, CallResolver):
     """Resolves the expressions of one model."""
 
     def resolve(self, expression: syntax.Expr) -> Value:
@@ -25,16 +25,16 @@ class Resolver(Members, Arithmetic, Calls):
 
 _RULES: dict[type, Callable[..., Value]] = {
     syntax.Number: Resolver._number,
-    syntax.Quantity: Resolver._quantity,
+    syntax.QuantityLiteral: Resolver._quantity,
     syntax.Text: Resolver._text,
     syntax.Bool: Resolver._bool,
     syntax.Name: Resolver._name,
-    syntax.Group: Resolver._group,
+    syntax.Parenthesized: Resolver._group,
     syntax.Member: Resolver._member,
     syntax.Item: Resolver._item,
     syntax.Prime: Resolver._prime,
-    syntax.Call: Resolver._call,
-    syntax.Method: Resolver._method,
+    syntax.FunctionCall: Resolver._call,
+    syntax.MethodCall: Resolver._method,
     syntax.Reduction: Resolver._reduction,
     syntax.Sum: Resolver._sum,
     syntax.Product: Resolver._product,

@@ -73,7 +73,7 @@ class TableSymbol:
 class FunctionSymbol:
     """A function, inlined where it is called."""
 
-    definition: syntax.Function
+    definition: syntax.FunctionDefinition
     source: SourceText
     file_scope: Scope
     place: Place
@@ -85,7 +85,7 @@ class FunctionSymbol:
 
 
 @dataclass(frozen=True, slots=True)
-class Family:
+class NameFamily:
     """Where a name's values live: the path of its own name, and the indices of the instances around it.
 
     shape holds the own indices only; `whole` the instances' too.  X[i].cell.q has family X.cell and prefix (i,).
@@ -107,7 +107,7 @@ class ParameterSymbol:
     """A parameter or an input that holds a constant."""
 
     name: str
-    family: Family
+    family: NameFamily
     dimension: Dimension | None
     truth: bool
     place: Place
@@ -124,7 +124,7 @@ class UnknownSymbol:
 
     name: str
     kind: str
-    family: Family
+    family: NameFamily
     dimension: Dimension
     domain: DomainSymbol | None
     complementary: bool
@@ -142,7 +142,7 @@ class ConstraintSymbol:
 
     name: str
     kind: str
-    family: Family
+    family: NameFamily
     place: Place
 
 
@@ -151,7 +151,7 @@ class NodeSymbol:
     """A node of a domain; coordinate: the one that is used as such."""
 
     name: str
-    family: Family
+    family: NameFamily
     domain: DomainSymbol
     place: Place
     coordinate: UnknownSymbol | None = None
@@ -196,7 +196,7 @@ class BranchSymbol:
     """A branch: effort e, flow f, displacement q, momentum p between two ends or along an expression."""
 
     name: str
-    family: Family
+    family: NameFamily
     domain: DomainSymbol
     place: Place
 
@@ -230,9 +230,9 @@ class Space:
     ends: dict[str, Any] = field(default_factory=dict)  # of its branches (instances.Ends)
     laws: dict[str, Place] = field(default_factory=dict)  # branches that have a law
 
-    def family(self, name: str, shape: Shape = ()) -> Family:
+    def family(self, name: str, shape: Shape = ()) -> NameFamily:
         """The family of a name declared inside."""
-        return Family(f"{self.path}.{name}" if self.path else name, self.prefix, self.around, shape)
+        return NameFamily(f"{self.path}.{name}" if self.path else name, self.prefix, self.around, shape)
 
 
 @dataclass(eq=False, slots=True)

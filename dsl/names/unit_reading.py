@@ -14,7 +14,7 @@ from sysdyn.dsl.tree import syntax
 
 
 def read_unit(
-    unit: syntax.Unit, scope: Scope, source: SourceText, report: Report, bound: Container[str] = ()
+    unit: syntax.UnitExpression, scope: Scope, source: SourceText, report: Report, bound: Container[str] = ()
 ) -> Unit | None:
     """The value of a unit; None after reporting E201 or E209.  bound: names in sight beside those of the scope."""
     declaring = scope.declaring
@@ -29,7 +29,9 @@ def read_unit(
     return found
 
 
-def _read(unit: syntax.Unit, scope: Scope, source: SourceText, report: Report, bound: Container[str]) -> Unit | None:
+def _read(
+    unit: syntax.UnitExpression, scope: Scope, source: SourceText, report: Report, bound: Container[str]
+) -> Unit | None:
     """The unit that a text means, its factors looked up; None after reporting a factor that is no unit (E201)."""
     dimension: Dimension = NONE
     scale = Fraction(1)
@@ -65,7 +67,9 @@ def _read(unit: syntax.Unit, scope: Scope, source: SourceText, report: Report, b
     return Unit(dimension, scale, si_text(dimension) if solved else unit.text)
 
 
-def _report_factor(unit: syntax.Unit, factor: syntax.UnitFactor, in_sight: bool, place: Place, report: Report) -> None:
+def _report_factor(
+    unit: syntax.UnitExpression, factor: syntax.UnitFactor, in_sight: bool, place: Place, report: Report
+) -> None:
     """Report a factor of a unit that nobody declared, with what is near."""
     # `$u` outside of a component
     if factor.name.startswith("$"):
@@ -110,7 +114,7 @@ def _report_factor(unit: syntax.Unit, factor: syntax.UnitFactor, in_sight: bool,
 _SPELLED = dict.fromkeys(("celsius", "Celsius", "centigrade"), "degC")
 
 
-def _meant(unit: syntax.Unit, factor: syntax.UnitFactor) -> str | None:
+def _meant(unit: syntax.UnitExpression, factor: syntax.UnitFactor) -> str | None:
     """The unit as it is written here: by rewriting; else the line that would declare it, else the nearest name."""
     # from certain to vague: another spelling, upper and lower case, a declaration, a near name
     right = _SPELLED.get(unit.text) or correct_spelling(unit.text)

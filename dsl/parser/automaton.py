@@ -16,7 +16,7 @@ from sysdyn.dsl.parser.grammar import load_tables
 from sysdyn.dsl.parser.lexing import Scanner
 from sysdyn.dsl.parser.notes import MAX_TERMS, Notes
 from sysdyn.dsl.text.source import SourceText, Span
-from sysdyn.dsl.tree.syntax import ANY, Broken, Text, Word
+from sysdyn.dsl.tree.syntax import ANY, BrokenStatement, Text, Word
 
 Build = Callable[[list[Any], Span, Notes], Any]
 
@@ -35,7 +35,7 @@ _BODY = ("statement", "scene_statement", "action", "item", "role", "bundle_membe
 _BLOCKS_OF_STATEMENTS = ("for_", "when", "every", "level", "scene")
 
 
-class _Rows(dict[int, dict[str, int]]):
+class _ActionRows(dict[int, dict[str, int]]):
     """For each state the action on each terminal: a state to shift to, or -1 - rule.  Read when a text comes there."""
 
     def __init__(self) -> None:
@@ -84,7 +84,7 @@ def _actions() -> tuple[tuple[str, int, Build | None, bool, tuple[tuple[int, boo
     return tuple(actions)
 
 
-_TABLE_ROWS = _Rows()
+_TABLE_ROWS = _ActionRows()
 _TABLE_GOTOS = _Gotos()
 _TABLE_RULES = _actions()
 
@@ -259,10 +259,10 @@ class Automaton:
                     return index + 1, left
         return 1, "item"
 
-    def broken(self, span: Span, *, nameless: bool = False) -> Broken:
+    def broken(self, span: Span, *, nameless: bool = False) -> BrokenStatement:
         """A statement that could not be read; nameless: any name may be that which it declares."""
         names = frozenset(_names(self.source.text[span.start : span.end]))
-        return Broken(names | {ANY} if nameless else names, span)
+        return BrokenStatement(names | {ANY} if nameless else names, span)
 
 
 def _names(text: str) -> Iterator[str]:

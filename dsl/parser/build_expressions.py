@@ -47,14 +47,14 @@ def range_(v: Values, span: Span, notes: Notes) -> s.Range:
     return s.Range(v[0], v[1], span)
 
 
-def call(v: Values, span: Span, notes: Notes) -> s.Call:
+def call(v: Values, span: Span, notes: Notes) -> s.FunctionCall:
     """`NAME ( [_args] )`."""
-    return s.Call(v[0].name, tuple(v[1:]), span)
+    return s.FunctionCall(v[0].name, tuple(v[1:]), span)
 
 
-def method(v: Values, span: Span, notes: Notes) -> s.Method:
+def method(v: Values, span: Span, notes: Notes) -> s.MethodCall:
     """`ref . NAME ( [_args] )`."""
-    return s.Method(v[0], v[1].name, tuple(v[2:]), span)
+    return s.MethodCall(v[0], v[1].name, tuple(v[2:]), span)
 
 
 def args(v: Values, span: Span, notes: Notes) -> tuple[s.Arg, ...]:
@@ -72,7 +72,7 @@ def named_arg(v: Values, span: Span, notes: Notes) -> s.Arg:
     return s.Arg(v[0].name, v[1], span)
 
 
-def reduction(v: Values, span: Span, notes: Notes) -> s.Reduction | s.Call:
+def reduction(v: Values, span: Span, notes: Notes) -> s.Reduction | s.FunctionCall:
     """`NAME ( NAME in range : expr )`."""
     operation, index, bounds, body = v
     if operation.name not in ("sum", "prod", "min", "max"):
@@ -146,9 +146,9 @@ def false(v: Values, span: Span, notes: Notes) -> s.Bool:
     return s.Bool(False, span)
 
 
-def group(v: Values, span: Span, notes: Notes) -> s.Group:
+def group(v: Values, span: Span, notes: Notes) -> s.Parenthesized:
     """`( expr )`."""
-    return s.Group(v[0], span)
+    return s.Parenthesized(v[0], span)
 
 
 def array(v: Values, span: Span, notes: Notes) -> s.Array:
@@ -166,7 +166,7 @@ def negative_number(v: Values, span: Span, notes: Notes) -> s.Number:
     return s.Number(-v[0].value, "-" + v[0].text, span)
 
 
-def unit(v: Values, span: Span, notes: Notes) -> s.Unit:
+def unit(v: Values, span: Span, notes: Notes) -> s.UnitExpression:
     """`unit_factor ((DOT | SLASH) unit_factor)*`."""
     factors: list[s.UnitFactor] = []
     for sign, factor in zip((".", *v[1::2]), v[0::2], strict=True):
@@ -181,7 +181,7 @@ def unit(v: Values, span: Span, notes: Notes) -> s.Unit:
         else:
             factors.append(s.UnitFactor(factor.name, factor.exponent, sign, factor.span))
     text = "".join(notes.source.text[span.start : span.end].split())
-    return s.Unit(tuple(factors), text, span)
+    return s.UnitExpression(tuple(factors), text, span)
 
 
 def unit_factor(v: Values, span: Span, notes: Notes) -> s.UnitFactor:
@@ -232,11 +232,11 @@ def dotted(v: Values, span: Span, notes: Notes) -> s.Dotted:
     return s.Dotted(tuple(word.name for word in v), span)
 
 
-def fixed(v: Values, span: Span, notes: Notes) -> s.Initial:
+def fixed(v: Values, span: Span, notes: Notes) -> s.InitialValue:
     """`= expr`."""
-    return s.Initial("fixed", v[0], span)
+    return s.InitialValue("fixed", v[0], span)
 
 
-def guess(v: Values, span: Span, notes: Notes) -> s.Initial:
+def guess(v: Values, span: Span, notes: Notes) -> s.InitialValue:
     """`~ expr`."""
-    return s.Initial("guess", v[0], span)
+    return s.InitialValue("guess", v[0], span)

@@ -8,24 +8,24 @@ from sysdyn.dsl.text.source import Span
 from sysdyn.dsl.tree import syntax as s
 
 
-def time(v: Values, span: Span, notes: Notes) -> s.Time:
+def time(v: Values, span: Span, notes: Notes) -> s.TimeStatement:
     """`time arith to arith`."""
-    return s.Time(v[0], v[1], span, notes.doc(span))
+    return s.TimeStatement(v[0], v[1], span, notes.doc(span))
 
 
-def set_(v: Values, span: Span, notes: Notes) -> s.Set:
+def set_(v: Values, span: Span, notes: Notes) -> s.SetStatement:
     """`set ref = expr`."""
-    return s.Set(v[0], v[1], span, notes.doc(span))
+    return s.SetStatement(v[0], v[1], span, notes.doc(span))
 
 
-def scene_level(v: Values, span: Span, notes: Notes) -> s.SceneLevel:
+def scene_level(v: Values, span: Span, notes: Notes) -> s.SceneLevelStatement:
     """`level ref = NAME`."""
-    return s.SceneLevel(v[0], v[1], span, notes.doc(span))
+    return s.SceneLevelStatement(v[0], v[1], span, notes.doc(span))
 
 
-def trace(v: Values, span: Span, notes: Notes) -> s.Trace:
+def trace(v: Values, span: Span, notes: Notes) -> s.TraceStatement:
     """`trace trace_items [every arith]`."""
-    return s.Trace(v[0], v[1], span, notes.doc(span))
+    return s.TraceStatement(v[0], v[1], span, notes.doc(span))
 
 
 def trace_item(v: Values, span: Span, notes: Notes) -> s.TraceItem:
@@ -33,9 +33,9 @@ def trace_item(v: Values, span: Span, notes: Notes) -> s.TraceItem:
     return s.TraceItem(v[0], v[1], v[2], span)
 
 
-def accuracy(v: Values, span: Span, notes: Notes) -> s.Accuracy:
+def accuracy(v: Values, span: Span, notes: Notes) -> s.AccuracyStatement:
     """`accuracy arith [on ariths [relative to range]]`."""
-    return s.Accuracy(v[0], v[1] or (), v[2] is not None, span, notes.doc(span))
+    return s.AccuracyStatement(v[0], v[1] or (), v[2] is not None, span, notes.doc(span))
 
 
 def to_range(v: Values, span: Span, notes: Notes) -> Span:
@@ -43,14 +43,14 @@ def to_range(v: Values, span: Span, notes: Notes) -> Span:
     return span
 
 
-def formulation(v: Values, span: Span, notes: Notes) -> s.Formulation:
+def formulation(v: Values, span: Span, notes: Notes) -> s.FormulationStatement:
     """`formulation NAME`."""
-    return s.Formulation(v[0], span, notes.doc(span))
+    return s.FormulationStatement(v[0], span, notes.doc(span))
 
 
-def solver(v: Values, span: Span, notes: Notes) -> s.Solver:
+def solver(v: Values, span: Span, notes: Notes) -> s.SolverStatement:
     """`solver NAME [options]`."""
-    return s.Solver(v[0], v[1], span, notes.doc(span))
+    return s.SolverStatement(v[0], v[1], span, notes.doc(span))
 
 
 def index_form(v: Values, span: Span, notes: Notes) -> s.Arg:
@@ -58,11 +58,11 @@ def index_form(v: Values, span: Span, notes: Notes) -> s.Arg:
     return s.Arg(v[0].name, s.Name(v[1].name, v[1].span), span)
 
 
-def redundancy(v: Values, span: Span, notes: Notes) -> s.Redundancy:
+def redundancy(v: Values, span: Span, notes: Notes) -> s.RedundancyStatement:
     """`redundancy NAME`."""
-    return s.Redundancy(v[0], span, notes.doc(span))
+    return s.RedundancyStatement(v[0], span, notes.doc(span))
 
 
-def limit(v: Values, span: Span, notes: Notes) -> s.Limit:
+def limit(v: Values, span: Span, notes: Notes) -> s.LimitStatement:
     """`limit NAME arith`."""
-    return s.Limit(v[0], v[1], span, notes.doc(span))
+    return s.LimitStatement(v[0], v[1], span, notes.doc(span))

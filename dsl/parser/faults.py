@@ -11,7 +11,7 @@ from sysdyn.dsl.parser.lexing import BLANK, NAME, RESERVED, Bracket
 from sysdyn.dsl.parser.shapes import SHAPES
 from sysdyn.dsl.text.diagnostics import Related
 from sysdyn.dsl.text.source import Span
-from sysdyn.dsl.tree.syntax import Broken
+from sysdyn.dsl.tree.syntax import BrokenStatement
 
 WORD = re.compile(NAME)
 _TARGET = re.compile(r"[\w.]+(?:\[[^\]\n]*\])?'?[ \t]*+")
@@ -152,7 +152,7 @@ class Faults:
         value = self.automaton.values[size - 2] if 3 <= size <= len(self.automaton.values) else None
         last = value[-1] if isinstance(value, list) and value else None
         return (
-            isinstance(last, Broken)
+            isinstance(last, BrokenStatement)
             and bool(said)
             and said[-1].code == "E109"
             and self.scanner.column(start) == self.scanner.column(last.span.start)
@@ -169,7 +169,7 @@ class Faults:
             return False
         value = self.automaton.values[size - 2]
         if isinstance(value, list) and value:
-            whole = [item for item in value if not isinstance(item, Broken)]
+            whole = [item for item in value if not isinstance(item, BrokenStatement)]
             before = (whole or value)[-1].span.start
         return self.scanner.column(start) > self.scanner.column(before)
 

@@ -33,7 +33,7 @@ _REGULAR = {
 }
 
 
-class Tables(NamedTuple):
+class AutomatonText(NamedTuple):
     """The automaton as lines of text: `automaton` decodes a row where it comes there."""
 
     final: str
@@ -49,10 +49,10 @@ class Tables(NamedTuple):
 
 
 _BREAK = "\n\f\n"
-"""Between the parts of the file: the fingerprint of the grammar, and the fields of `Tables`."""
+"""Between the parts of the file: the fingerprint of the grammar, and the fields of `AutomatonText`."""
 
 
-def load_tables() -> Tables:
+def load_tables() -> AutomatonText:
     """The tables of the grammar: those that stand beside it, or built by lark and put there where that can be.
 
     Raises ImportError where neither they nor lark are there.
@@ -63,7 +63,7 @@ def load_tables() -> Tables:
     except OSError:
         fingerprint, parts = "", []
     if fingerprint == _fingerprint(grammar):
-        return Tables(*parts)
+        return AutomatonText(*parts)
     try:
         tables = build_tables()
     except ModuleNotFoundError as error:
@@ -78,7 +78,7 @@ def write_tables() -> None:
     _write(build_tables())
 
 
-def _write(tables: Tables) -> None:
+def _write(tables: AutomatonText) -> None:
     """Whole or not at all: other processes may read meanwhile."""
     partial = _TABLES.with_suffix(f".{os.getpid()}")
     fingerprint = _fingerprint(_GRAMMAR.read_text(encoding="utf-8"))
@@ -99,7 +99,7 @@ def build_lark(*, strict: bool = False) -> Any:
     return Lark(text, parser="lalr", lexer="contextual", strict=strict, start="start", maybe_placeholders=True)
 
 
-def build_tables(*, strict: bool = False) -> Tables:
+def build_tables(*, strict: bool = False) -> AutomatonText:
     """The tables, built by lark; strict: as of `build_lark`."""
     lark = build_lark(strict=strict)
     kinds = {terminal.name: _kinds(terminal) for terminal in lark.terminals}
@@ -130,7 +130,7 @@ def build_tables(*, strict: bool = False) -> Tables:
             by_action.setdefault(code, set()).update(kinds[symbol])
         states.append(_number_lookaheads(by_action, lookaheads))
         gotos.append(tuple(sorted(goto)))
-    return Tables(
+    return AutomatonText(
         final=str(number[automaton.end_states["start"]]),
         lookaheads="\n".join(" ".join(terminals) for terminals in lookaheads),
         rows="\n".join(" ".join(f"{action}:{number}" for action, number in row) for row in states),

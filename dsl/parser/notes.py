@@ -16,7 +16,7 @@ from sysdyn.dsl.model.units import exponent_text
 from sysdyn.dsl.parser.lexing import EXPONENT
 from sysdyn.dsl.text.diagnostics import Edit, Report
 from sysdyn.dsl.text.source import SourceText, Span
-from sysdyn.dsl.tree.syntax import Decl, Number, Quantity, Unit, UnitFactor, Word
+from sysdyn.dsl.tree.syntax import Decl, Number, QuantityLiteral, UnitExpression, UnitFactor, Word
 from sysdyn.values import dataclass
 
 PREDEFINED = frozenset({"t", "pi", "ground", "audit"})
@@ -66,11 +66,11 @@ class Notes:
         """A number as written."""
         return Number(self._value(text, span), text, span)
 
-    def quantity(self, text: str, span: Span, unit: Span) -> Quantity:
+    def quantity(self, text: str, span: Span, unit: Span) -> QuantityLiteral:
         """A number with its unit; `text` is the number's."""
-        return Quantity(self._value(text, span), text, self.unit(unit), span)
+        return QuantityLiteral(self._value(text, span), text, self.unit(unit), span)
 
-    def unit(self, span: Span) -> Unit:
+    def unit(self, span: Span) -> UnitExpression:
         """The unit written inside a quantity."""
         text = self.source.text[span.start : span.end]
         factors = []
@@ -80,7 +80,7 @@ class Notes:
             written = match.group(3) or "1"
             power = self._read_exponent(written, place, span) if written[0] == "(" else self.exponent(written, place)
             factors.append(UnitFactor(match.group(2), power, match.group(1) or ".", place))
-        return Unit(tuple(factors), text, span)
+        return UnitExpression(tuple(factors), text, span)
 
     def exponent(self, text: str, span: Span) -> int | Fraction:
         """The exponent of a unit: an integer of one or two digits, a decimal or a fraction."""

@@ -1,7 +1,7 @@
 """Text to syntax tree: never raises, reports everything that cannot be read, returns the rest.
 
 An error ends its statement, not the file: reading goes on with the next statement of the same
-block, and a `Broken` node stands where the statement was.
+block, and a `BrokenStatement` node stands where the statement was.
 """
 
 from __future__ import annotations

@@ -2,7 +2,7 @@
 
 A slip that has one obvious meaning is mended in place (`==` for `=`, a reserved word as a name,
 `3kg`). Otherwise the statement is given up at its start on the stack, the text is skipped to its
-end, and a `Broken` node takes its place; a statement with a block loses only its head, the block is
+end, and a `BrokenStatement` node takes its place; a statement with a block loses only its head, the block is
 read. Indentation is never needed, but where a bracket is missing it tells where.
 """
 

@@ -13,9 +13,9 @@ from collections.abc import Iterable, Sequence
 from sysdyn.dsl.elaborate.elaborate import Elaborator
 from sysdyn.dsl.model import expression as ex
 from sysdyn.dsl.model.calculus import derivative
+from sysdyn.dsl.model.connected_components import Joined
 from sysdyn.dsl.model.evaluation import evaluate
 from sysdyn.dsl.model.expression import Node
-from sysdyn.dsl.model.joined import Joined
 from sysdyn.dsl.model.network import Branch, Expectation, Observation
 from sysdyn.dsl.model.rewriting import expressions
 from sysdyn.dsl.text.diagnostics import Place, Report

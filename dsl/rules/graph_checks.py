@@ -9,15 +9,15 @@ from dataclasses import replace
 from sysdyn.dsl.elaborate.elaborate import Elaborator
 from sysdyn.dsl.model import expression as ex
 from sysdyn.dsl.model.calculus import derivative
+from sysdyn.dsl.model.connected_components import Joined
 from sysdyn.dsl.model.expression import Node
-from sysdyn.dsl.model.joined import Joined
 from sysdyn.dsl.model.network import Branch, NodeFamily, Terminal
 from sysdyn.dsl.model.rewriting import expressions
 from sysdyn.dsl.model.signs import Reals, reals
 from sysdyn.dsl.model.values import Values, as_constants
 from sysdyn.dsl.parser.notes import PREDEFINED
 from sysdyn.dsl.rules import lossless
-from sysdyn.dsl.rules.untouched import Box, box_text, first_gap
+from sysdyn.dsl.rules.untouched_elements import Box, box_text, first_gap
 from sysdyn.dsl.text.diagnostics import Report
 
 NEAR = 3

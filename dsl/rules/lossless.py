@@ -15,7 +15,7 @@ from sysdyn.dsl.elaborate.elaborate import Elaborator
 from sysdyn.dsl.model import expression as ex
 from sysdyn.dsl.model.calculus import derivative
 from sysdyn.dsl.model.expression import Node
-from sysdyn.dsl.model.network import Branch, Constraint, Energy, Loop, Terminal, Work
+from sysdyn.dsl.model.network import Branch, Constraint, EnergyTerm, Loop, Terminal, VirtualWork
 from sysdyn.dsl.model.values import Values
 from sysdyn.dsl.text.diagnostics import Place, Report
 from sysdyn.dsl.tree import syntax
@@ -33,8 +33,8 @@ _Part = tuple[str, tuple[Loop, ...], Node]
 
 def run(model: Elaborator, known: Values, report: Report) -> None:
     """The rule for every component that claims it."""
-    for space, body in model.bodies:
-        claims = body.statements_of(syntax.Lossless)
+    for space, body in model.instances.bodies:
+        claims = body.statements_of(syntax.LosslessStatement)
         if not claims:
             continue
         place = Place(space.source, claims[0][0].span)
@@ -50,7 +50,7 @@ def _inside(name: str, path: str) -> bool:
     return name.startswith(f"{path}.")
 
 
-def _statements_of(model: Elaborator, path: str) -> Iterator[Energy | Work | Constraint]:
+def _statements_of(model: Elaborator, path: str) -> Iterator[EnergyTerm | VirtualWork | Constraint]:
     for owner, statements in model.parts.owned.items():
         if owner == path or _inside(owner, path):
             yield from statements
@@ -64,7 +64,7 @@ def _stores(model: Elaborator, path: str) -> Iterator[str]:
     yield from (
         f"an energy {s.function}"
         for s in _statements_of(model, path)
-        if isinstance(s, Energy) and s.function not in ("D", "G") and not s.function.startswith("kept")
+        if isinstance(s, EnergyTerm) and s.function not in ("D", "G") and not s.function.startswith("kept")
     )
 
 
@@ -76,9 +76,9 @@ def _powers(model: Elaborator, path: str) -> Iterator[_Part]:
             yield f"'{b.name}' is {WHAT[b.kind]}", b.loops, _power(b, b.law)
     # works, contents, and constraints that move with time
     for s in _statements_of(model, path):
-        if isinstance(s, Work):
+        if isinstance(s, VirtualWork):
             yield "a work", s.loops, ex.neg(ex.mul(s.effort, _rate(s.on)))
-        elif isinstance(s, Energy) and s.function in ("D", "G"):
+        elif isinstance(s, EnergyTerm) and s.function in ("D", "G"):
             kinds = (*FLOW_OF.values(), "ne", "be")
             own = [n for n in ex.variables(s.expression) if n.op == "var" and n.data[1] in kinds]
             yield "a content", s.loops, ex.add(*(ex.mul(n, derivative(s.expression, n)) for n in own))

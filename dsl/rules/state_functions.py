@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from sysdyn.dsl.model.expression import Node
-from sysdyn.dsl.model.network import Energy, Network
+from sysdyn.dsl.model.network import EnergyTerm, Network
 from sysdyn.dsl.model.paynter import LETTERS, STATE_FUNCTIONS, StateFunction
 from sysdyn.dsl.rules.letters import Diagram, unknowns_of
 from sysdyn.dsl.text.diagnostics import Report
@@ -39,7 +39,7 @@ def state_functions(network: Network, report: Report) -> None:
             report.error("E307", message, branch.place, help="a potential store, or a dissipator")
 
 
-def _report_misplaced(energy: Energy, unknowns: list[Node], diagram: Diagram, report: Report) -> bool:
+def _report_misplaced(energy: EnergyTerm, unknowns: list[Node], diagram: Diagram, report: Report) -> bool:
     """Whether a variable stands there that the function does not have; reported."""
     function = STATE_FUNCTIONS[energy.function]
     for node in unknowns:
@@ -72,7 +72,7 @@ def _right(function: StateFunction, letter: str) -> str | None:
     return f"'{word} {found[0].name} = ...' is a function of {_PLURAL[letter]}"
 
 
-def _own(energy: Energy, unknowns: list[Node], diagram: Diagram, report: Report) -> None:
+def _own(energy: EnergyTerm, unknowns: list[Node], diagram: Diagram, report: Report) -> None:
     """A function without its own variable has no slope: it would be dropped, or become another store."""
     function = STATE_FUNCTIONS[energy.function]
     if any(diagram.letter(n) == function.own for n in unknowns):
@@ -85,7 +85,7 @@ def _own(energy: Energy, unknowns: list[Node], diagram: Diagram, report: Report)
     report.error("E307", message, energy.place, help=help_)
 
 
-def _kinetic(energy: Energy, unknowns: list[Node], diagram: Diagram, report: Report) -> None:
+def _kinetic(energy: EnergyTerm, unknowns: list[Node], diagram: Diagram, report: Report) -> None:
     """Kinetic energies in a domain without kinetic stores (language, section 11, 40)."""
     function = STATE_FUNCTIONS[energy.function]
     if function.edge != "kinetic":

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from sysdyn.dsl.model.network import Energy, Network
+from sysdyn.dsl.model.network import EnergyTerm, Network
 from sysdyn.dsl.model.paynter import STATE_FUNCTIONS
 from sysdyn.dsl.rules.letters import Diagram, unknowns_of
 from sysdyn.dsl.text.diagnostics import Related, Report
@@ -11,7 +11,7 @@ from sysdyn.dsl.text.diagnostics import Related, Report
 def transforms(network: Network, report: Report) -> None:
     """T and T*, V and V*, D and G over one coordinate, node or branch."""
     diagram = Diagram(network)
-    owners: dict[str, dict[str, Energy]] = {name: {} for name in STATE_FUNCTIONS}
+    owners: dict[str, dict[str, EnergyTerm]] = {name: {} for name in STATE_FUNCTIONS}
     # which coordinate, node or branch has which function
     for energy in network.energies:
         own = STATE_FUNCTIONS[energy.function].own

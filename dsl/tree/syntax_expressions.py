@@ -18,12 +18,12 @@ class Number:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Quantity:
+class QuantityLiteral:
     """A number with its unit; `text` is the number as written."""
 
     value: float
     text: str
-    unit: Unit
+    unit: UnitExpression
     span: Span
 
 
@@ -78,7 +78,7 @@ class Prime:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Call:
+class FunctionCall:
     """`name(arg, ...)`; the name's span is the first `len(name)` code points."""
 
     name: str
@@ -87,7 +87,7 @@ class Call:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Method:
+class MethodCall:
     """`base.name(arg, ...)`."""
 
     base: Expr
@@ -194,7 +194,7 @@ class Array:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Group:
+class Parenthesized:
     """`(expr)`: the author's parentheses."""
 
     expr: Expr
@@ -255,7 +255,7 @@ class UnitFactor:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Unit:
+class UnitExpression:
     """A unit as written."""
 
     factors: tuple[UnitFactor, ...]
@@ -265,15 +265,15 @@ class Unit:
 
 Expr = (
     Number
-    | Quantity
+    | QuantityLiteral
     | Text
     | Bool
     | Name
     | Member
     | Item
     | Prime
-    | Call
-    | Method
+    | FunctionCall
+    | MethodCall
     | Reduction
     | Sum
     | Product
@@ -285,6 +285,6 @@ Expr = (
     | Not
     | Conditional
     | Array
-    | Group
+    | Parenthesized
 )
 Index = Expr | Range

@@ -5,24 +5,24 @@ from __future__ import annotations
 from typing import Literal
 
 from sysdyn.dsl.text.source import SourceText, Span
-from sysdyn.dsl.tree.syntax_expressions import Dotted, Expr, Number, Unit, Word
+from sysdyn.dsl.tree.syntax_expressions import Dotted, Expr, Number, UnitExpression, Word
 from sysdyn.dsl.tree.syntax_scenes import SceneStatement
-from sysdyn.dsl.tree.syntax_statements import Broken, Statement
+from sysdyn.dsl.tree.syntax_statements import BrokenStatement, Statement
 from sysdyn.values import dataclass
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Parameter:
+class FormalParameter:
     """An argument in the head of a function or table."""
 
     name: str
     size: Expr | None
-    unit: Unit
+    unit: UnitExpression
     span: Span
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Row:
+class TableRow:
     """One row of a table; signs are part of the numbers."""
 
     numbers: tuple[Number, ...]
@@ -35,7 +35,7 @@ class DomainRole:
 
     kind: Literal["effort", "flow", "momentum", "displacement"]
     name: Word
-    unit: Unit
+    unit: UnitExpression
     span: Span
 
 
@@ -59,7 +59,7 @@ class DomainGround:
 class DomainPseudo:
     """`pseudo: W.K`: the unit of effort times flow."""
 
-    unit: Unit
+    unit: UnitExpression
     span: Span
 
 
@@ -83,7 +83,7 @@ class Import:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Domain:
+class DomainDefinition:
     """`domain D { ... }`."""
 
     name: Word
@@ -93,11 +93,11 @@ class Domain:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Bundle:
+class BundleDefinition:
     """`bundle planar { x, y: translation }`."""
 
     name: Word
-    members: tuple[BundleMember | Broken, ...]
+    members: tuple[BundleMember | BrokenStatement, ...]
     span: Span
     doc: str | None = None
 
@@ -122,7 +122,7 @@ class UnitBase:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Const:
+class ConstDefinition:
     """`const g0 = 9.81 m/s^2`."""
 
     name: Word
@@ -132,34 +132,34 @@ class Const:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Function:
+class FunctionDefinition:
     """`fn f(x: m) -> H = expr`."""
 
     name: Word
-    params: tuple[Parameter, ...]
-    result: Unit
+    params: tuple[FormalParameter, ...]
+    result: UnitExpression
     value: Expr
     span: Span
     doc: str | None = None
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Table:
+class TableDefinition:
     """`table f(x: mm) -> mH pchip clamp [ ... ]` or `file "f.csv"` (then rows is None)."""
 
     name: Word
-    params: tuple[Parameter, ...]
-    result: Unit
+    params: tuple[FormalParameter, ...]
+    result: UnitExpression
     interpolation: str
     extrapolation: str | None
-    rows: tuple[Row, ...] | None
+    rows: tuple[TableRow, ...] | None
     file: str | None
     span: Span
     doc: str | None = None
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Component:
+class ComponentDefinition:
     """`component N { ... }`."""
 
     name: Word
@@ -169,7 +169,7 @@ class Component:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Model:
+class ModelDefinition:
     """`model N { ... }`."""
 
     name: Word
@@ -179,7 +179,7 @@ class Model:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Scene:
+class SceneDefinition:
     """`scene N of M { ... }`."""
 
     name: Word
@@ -208,7 +208,18 @@ class File:
     span: Span
 
 
-DomainPart = DomainRole | DomainNode | DomainGround | DomainPseudo | Broken
+DomainPart = DomainRole | DomainNode | DomainGround | DomainPseudo | BrokenStatement
 TopLevel = (
-    Import | Domain | Bundle | UnitAlias | UnitBase | Const | Function | Table | Component | Model | Scene | Broken
+    Import
+    | DomainDefinition
+    | BundleDefinition
+    | UnitAlias
+    | UnitBase
+    | ConstDefinition
+    | FunctionDefinition
+    | TableDefinition
+    | ComponentDefinition
+    | ModelDefinition
+    | SceneDefinition
+    | BrokenStatement
 )

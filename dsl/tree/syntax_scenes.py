@@ -3,8 +3,14 @@
 from __future__ import annotations
 
 from sysdyn.dsl.text.source import Span
-from sysdyn.dsl.tree.syntax_expressions import Arg, Expr, Unit, Word
-from sysdyn.dsl.tree.syntax_statements import Broken, Expect, Golden, Init, When
+from sysdyn.dsl.tree.syntax_expressions import Arg, Expr, UnitExpression, Word
+from sysdyn.dsl.tree.syntax_statements import (
+    BrokenStatement,
+    ExpectStatement,
+    GoldenStatement,
+    InitStatement,
+    WhenStatement,
+)
 from sysdyn.values import dataclass
 
 
@@ -13,13 +19,13 @@ class TraceItem:
     """`expr [in unit] [as alias]`."""
 
     expr: Expr
-    unit: Unit | None
+    unit: UnitExpression | None
     alias: Word | None
     span: Span
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Time:
+class TimeStatement:
     """`time a to b`."""
 
     start: Expr
@@ -29,7 +35,7 @@ class Time:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Set:
+class SetStatement:
     """`set ref = expr`."""
 
     target: Expr
@@ -39,7 +45,7 @@ class Set:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class SceneLevel:
+class SceneLevelStatement:
     """`level ref = name`."""
 
     target: Expr
@@ -49,7 +55,7 @@ class SceneLevel:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Trace:
+class TraceStatement:
     """`trace expr, ... [every dt]`."""
 
     items: tuple[TraceItem, ...]
@@ -59,7 +65,7 @@ class Trace:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Accuracy:
+class AccuracyStatement:
     """`accuracy r [on a, b [relative to range]]`."""
 
     value: Expr
@@ -70,7 +76,7 @@ class Accuracy:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Formulation:
+class FormulationStatement:
     """`formulation lagrangian`."""
 
     name: Word
@@ -79,7 +85,7 @@ class Formulation:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Solver:
+class SolverStatement:
     """`solver bdf(order = 5)`."""
 
     name: Word
@@ -89,7 +95,7 @@ class Solver:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Redundancy:
+class RedundancyStatement:
     """`redundancy drop`."""
 
     name: Word
@@ -98,7 +104,7 @@ class Redundancy:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Limit:
+class LimitStatement:
     """`limit steps n`."""
 
     name: Word
@@ -108,18 +114,18 @@ class Limit:
 
 
 SceneStatement = (
-    Time
-    | Set
-    | SceneLevel
-    | Trace
-    | Accuracy
-    | Formulation
-    | Solver
-    | Redundancy
-    | Limit
-    | Init
-    | When
-    | Expect
-    | Golden
-    | Broken
+    TimeStatement
+    | SetStatement
+    | SceneLevelStatement
+    | TraceStatement
+    | AccuracyStatement
+    | FormulationStatement
+    | SolverStatement
+    | RedundancyStatement
+    | LimitStatement
+    | InitStatement
+    | WhenStatement
+    | ExpectStatement
+    | GoldenStatement
+    | BrokenStatement
 )

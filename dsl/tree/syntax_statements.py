@@ -5,12 +5,12 @@ from __future__ import annotations
 from typing import Literal
 
 from sysdyn.dsl.text.source import Span
-from sysdyn.dsl.tree.syntax_expressions import Arg, Decl, Dotted, Expr, Unit, Word
+from sysdyn.dsl.tree.syntax_expressions import Arg, Decl, Dotted, Expr, UnitExpression, Word
 from sysdyn.values import dataclass
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Initial:
+class InitialValue:
     """`= value` or `~ value`."""
 
     kind: Literal["fixed", "guess"]
@@ -72,7 +72,7 @@ class Single:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Action:
+class ActionStatement:
     """`target := value`."""
 
     target: Expr
@@ -81,29 +81,29 @@ class Action:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Param:
+class ParamStatement:
     """`param k: N/m`, `param k = 3 N/m`."""
 
     decl: Decl
-    unit: Unit | None
+    unit: UnitExpression | None
     value: Expr | None
     span: Span
     doc: str | None = None
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Node:
+class NodeStatement:
     """`node a, b: electrical [= v]`."""
 
     decls: tuple[Decl, ...]
     domain: Word
-    init: Initial | None
+    init: InitialValue | None
     span: Span
     doc: str | None = None
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Port:
+class PortStatement:
     """`port a: electrical`."""
 
     decls: tuple[Decl, ...]
@@ -113,7 +113,7 @@ class Port:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Branch:
+class BranchStatement:
     """`branch [b]: D`; without a name decls is empty."""
 
     decls: tuple[Decl, ...]
@@ -123,18 +123,18 @@ class Branch:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Input:
+class InputStatement:
     """`input u: V [= expr]`."""
 
     decl: Decl
-    unit: Unit
+    unit: UnitExpression
     value: Expr | None
     span: Span
     doc: str | None = None
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Output:
+class OutputStatement:
     """`output y = expr`."""
 
     decl: Decl
@@ -144,64 +144,64 @@ class Output:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Quasi:
+class QuasiStatement:
     """`quasi w: rad/s = expr`, a quasi-velocity: linear in flows, its coefficients of displacements."""
 
     decl: Decl
-    unit: Unit
+    unit: UnitExpression
     value: Expr
     span: Span
     doc: str | None = None
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Coord:
+class CoordStatement:
     """`coord q: D [tangible|intangible] [= v]`; tangible is None where nothing is asserted."""
 
     kind: Literal["coord", "cocoord"]
     decls: tuple[Decl, ...]
     domain: Word
     tangible: bool | None
-    init: Initial | None
+    init: InitialValue | None
     span: Span
     doc: str | None = None
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Implicit:
+class ImplicitStatement:
     """`implicit e: V [~ guess]`."""
 
     decls: tuple[Decl, ...]
-    unit: Unit
-    init: Initial | None
+    unit: UnitExpression
+    init: InitialValue | None
     span: Span
     doc: str | None = None
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class State:
+class StateStatement:
     """`state s: u = v`."""
 
     decl: Decl
-    unit: Unit | None
+    unit: UnitExpression | None
     value: Expr | None
     span: Span
     doc: str | None = None
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Discrete:
+class DiscreteStatement:
     """`discrete g = 1`."""
 
     decl: Decl
-    unit: Unit | None
+    unit: UnitExpression | None
     value: Expr
     span: Span
     doc: str | None = None
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Dynamic:
+class DynamicStatement:
     """`dynamic s' = expr`."""
 
     target: Expr
@@ -211,7 +211,7 @@ class Dynamic:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Let:
+class LetStatement:
     """`let x = expr`."""
 
     decl: Decl
@@ -221,7 +221,7 @@ class Let:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Law:
+class LawStatement:
     """`law e = R*f`."""
 
     left: Expr
@@ -231,7 +231,7 @@ class Law:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Energy:
+class EnergyStatement:
     """`energy T* [name] = expr`."""
 
     function: Literal["T*", "T", "V*", "V"]
@@ -242,7 +242,7 @@ class Energy:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Content:
+class ContentStatement:
     """`content D [name] = expr`."""
 
     function: Literal["D", "G"]
@@ -253,7 +253,7 @@ class Content:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Work:
+class WorkStatement:
     """`work effort on expr`."""
 
     effort: Expr
@@ -263,7 +263,7 @@ class Work:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Constraint:
+class ConstraintStatement:
     """`phi n: left = right [while g] [restitution r]`."""
 
     kind: Literal["phi", "psi", "gamma"]
@@ -277,37 +277,37 @@ class Constraint:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Init:
+class InitStatement:
     """`init ref = v`, `init ref ~ v`; also in scenes."""
 
     target: Expr
-    initial: Initial
+    initial: InitialValue
     span: Span
     doc: str | None = None
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class When:
+class WhenStatement:
     """`when c { a := b }`; also in scenes."""
 
     condition: Expr
-    actions: tuple[Action, ...]
+    actions: tuple[ActionStatement, ...]
     span: Span
     doc: str | None = None
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Every:
+class EveryStatement:
     """`every 5 ms { a := b }`."""
 
     period: Expr
-    actions: tuple[Action, ...]
+    actions: tuple[ActionStatement, ...]
     span: Span
     doc: str | None = None
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class For:
+class ForStatement:
     """`for i in lower..upper { ... }`."""
 
     index: Word
@@ -319,7 +319,7 @@ class For:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Level:
+class LevelStatement:
     """`level n [extends m] [default] { ... }`."""
 
     name: Word
@@ -331,7 +331,7 @@ class Level:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Require:
+class RequireStatement:
     """`require expr`."""
 
     condition: Expr
@@ -340,7 +340,7 @@ class Require:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Expect:
+class ExpectStatement:
     """`expect [moment:] left op right [within d]`; `at` is the time of moment `at`."""
 
     moment: Literal["always", "finally", "static", "at"] | None
@@ -354,7 +354,7 @@ class Expect:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Golden:
+class GoldenStatement:
     """`expect golden "file" within r`."""
 
     file: str
@@ -364,7 +364,7 @@ class Golden:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Lossless:
+class LosslessStatement:
     """`lossless`."""
 
     span: Span
@@ -372,7 +372,7 @@ class Lossless:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Instance:
+class InstanceStatement:
     """`label: comp.level(p = v) a -> b`; args is None where no parentheses are written."""
 
     decl: Decl
@@ -388,7 +388,7 @@ ANY = "*"
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Broken:
+class BrokenStatement:
     """A statement that could not be read; `names` are the names in it, so that later stages can spare
     the author errors that only follow from this one: all names, where ANY is among them.
     """
@@ -399,33 +399,33 @@ class Broken:
 
 Connection = Across | On | Bind | BindAcross | Single
 Statement = (
-    Param
-    | Node
-    | Port
-    | Branch
-    | Input
-    | Output
-    | Quasi
-    | Coord
-    | Implicit
-    | State
-    | Discrete
-    | Dynamic
-    | Let
-    | Law
-    | Energy
-    | Content
-    | Work
-    | Constraint
-    | Init
-    | When
-    | Every
-    | For
-    | Level
-    | Require
-    | Expect
-    | Golden
-    | Lossless
-    | Instance
-    | Broken
+    ParamStatement
+    | NodeStatement
+    | PortStatement
+    | BranchStatement
+    | InputStatement
+    | OutputStatement
+    | QuasiStatement
+    | CoordStatement
+    | ImplicitStatement
+    | StateStatement
+    | DiscreteStatement
+    | DynamicStatement
+    | LetStatement
+    | LawStatement
+    | EnergyStatement
+    | ContentStatement
+    | WorkStatement
+    | ConstraintStatement
+    | InitStatement
+    | WhenStatement
+    | EveryStatement
+    | ForStatement
+    | LevelStatement
+    | RequireStatement
+    | ExpectStatement
+    | GoldenStatement
+    | LosslessStatement
+    | InstanceStatement
+    | BrokenStatement
 )

@@ -14,7 +14,7 @@ from sysdyn.runtime.model.description import Floats, Ints
 from sysdyn.runtime.model.failures import NoSuchForm, WrongOption
 from sysdyn.runtime.numerics.points import distinct
 from sysdyn.runtime.structure.structure import Structure
-from sysdyn.runtime.trace.trace import Parameter
+from sysdyn.runtime.trace.trace import TraceParameter
 from sysdyn.values import dataclass
 
 METHODS = ("bdf", "radau", "rosenbrock", "dopri", "energy", "euler")
@@ -76,7 +76,7 @@ class Options:
     wall_began: float | None = None
     progress: Progress | None = None
     attributes: Mapping[str, str] = field(default_factory=dict)
-    parameters: tuple[Parameter, ...] = ()
+    parameters: tuple[TraceParameter, ...] = ()
 
 
 HIGHEST = 3

@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 from sysdyn.runtime.comparison.curve import Floats
-from sysdyn.runtime.comparison.verdict import About, Event
+from sysdyn.runtime.comparison.verdict import About, TraceEvent
 from sysdyn.runtime.trace.trace import Trace
 
 
@@ -19,7 +19,7 @@ class Arrays:
         values: Mapping[str, Floats],
         rates: Mapping[str, Floats] | None = None,
         about: Sequence[About] = (),
-        events: Sequence[Event] = (),
+        events: Sequence[TraceEvent] = (),
         time_unit: str = "s",
     ) -> None:
         self.time = np.asarray(time, dtype=np.float64)

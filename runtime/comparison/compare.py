@@ -15,10 +15,10 @@ from sysdyn.runtime.comparison.quantities import Pair, compared, lonely, ratio_o
 from sysdyn.runtime.comparison.verdict import (
     SHARE,
     Compared,
-    Event,
     Incomparable,
     Source,
     Tolerance,
+    TraceEvent,
     Verdict,
     Worst,
     rank,
@@ -150,7 +150,7 @@ def _coverage(times: tuple[Floats, Floats], tau: float) -> list[Compared]:
     return found
 
 
-def _ordered(one: Sequence[Event], two: list[Event], tau: float) -> list[Event]:
+def _ordered(one: Sequence[TraceEvent], two: list[TraceEvent], tau: float) -> list[TraceEvent]:
     """The second events, those within tau of each other in the order of the first ones."""
     for k, wanted in enumerate(one[: len(two)]):
         ends = (at for at in range(k, len(two)) if two[at].name == wanted.name or two[at].time - two[k].time > tau)
@@ -166,7 +166,7 @@ def _events(ref: Source, test: Source, rescaled: tuple[float, float], tau: float
     Events of one instant have no order.
     """
     one = ref.events
-    two = _ordered(one, [Event(e.time * rescaled[0] + rescaled[1], e.name) for e in test.events], tau)
+    two = _ordered(one, [TraceEvent(e.time * rescaled[0] + rescaled[1], e.name) for e in test.events], tau)
     if not one and not two:
         return []
     worst = Worst(0.0, one[0].time if one else two[0].time)

@@ -11,7 +11,7 @@ from typing import Any, Self
 
 import numpy as np
 from sysdyn.runtime.comparison.curve import Floats
-from sysdyn.runtime.comparison.verdict import About, Event, Incomparable
+from sysdyn.runtime.comparison.verdict import About, Incomparable, TraceEvent
 from sysdyn.runtime.model.failures import TraceError
 from sysdyn.runtime.trace.opening import opened
 from sysdyn.runtime.trace.trace_store import in_words
@@ -92,7 +92,7 @@ class Recorded:
             nominal = nominal or None  # a run that was killed has not yet said one
         return About(name, _text(item.attrs.get("units", "1")), nominal)
 
-    def _events(self, found: Any) -> tuple[Event, ...]:
+    def _events(self, found: Any) -> tuple[TraceEvent, ...]:
         """/events: a group with `time` and `name`, or rows of both."""
         if found is None:
             return ()
@@ -102,7 +102,7 @@ class Recorded:
         times, names = np.asarray(found["time"], dtype=np.float64), np.asarray(found["name"])
         if times.shape != names.shape or times.ndim != 1 or times.size > EVENTS:
             raise Incomparable(f"{self.path}: /events is no list")
-        return tuple(Event(float(t), _text(n)) for t, n in zip(times, names, strict=True))
+        return tuple(TraceEvent(float(t), _text(n)) for t, n in zip(times, names, strict=True))
 
     def read(self, name: str, first: int, last: int) -> tuple[Floats, Floats | None]:
         """Rows first..last-1: values and, where they are stored, rates."""

@@ -42,7 +42,7 @@ class About:
 
 
 @dataclass(frozen=True, slots=True)
-class Event:
+class TraceEvent:
     """An event of a trace; time [s]."""
 
     time: float
@@ -65,7 +65,7 @@ class Source(Protocol):
         """Traced quantities by name, without the meters."""
 
     @property
-    def events(self) -> tuple[Event, ...]:
+    def events(self) -> tuple[TraceEvent, ...]:
         """Events in their order."""
 
     def read(self, name: str, first: int, last: int) -> tuple[Floats, Floats | None]:

@@ -38,7 +38,7 @@ from sysdyn.runtime.start.settled import HELD, Settler
 from sysdyn.runtime.start.start import ConsistentState
 from sysdyn.runtime.structure.rates import determined
 from sysdyn.runtime.trace.keeping import Held
-from sysdyn.runtime.trace.trace import Parameter, Trace
+from sysdyn.runtime.trace.trace import Trace, TraceParameter
 
 MOST = 48
 """Instants of comparison that are taken of a run's steps, at most twice that."""
@@ -380,7 +380,7 @@ class Batch:
         self.system.failure.check()
         return found
 
-    def trace(self, p: Floats, anchor: Floats, parameters: tuple[Parameter, ...]) -> Trace | None:
+    def trace(self, p: Floats, anchor: Floats, parameters: tuple[TraceParameter, ...]) -> Trace | None:
         """One run with its numbers p [parameters] and initial values anchor [written], as `simulate` hands back its
         own; None where it has no result here.  parameters: as the trace lists them.
         """

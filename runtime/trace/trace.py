@@ -18,10 +18,10 @@ from sysdyn.runtime.events.plan import Happened
 from sysdyn.runtime.model.description import Floats
 from sysdyn.runtime.model.failures import TraceError
 from sysdyn.runtime.trace.opening import of_sweep, opened
-from sysdyn.runtime.trace.trace_store import BEFORE, Column, Layout, Parameter, Store, columns_of, input_output
+from sysdyn.runtime.trace.trace_store import BEFORE, Column, Layout, Store, TraceParameter, columns_of, input_output
 from sysdyn.values import dataclass
 
-__all__ = ["Column", "Layout", "Parameter", "Quantity", "Trace", "columns_of"]
+__all__ = ["Column", "Layout", "Quantity", "Trace", "TraceParameter", "columns_of"]
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
@@ -159,7 +159,7 @@ class Trace:
             rows[:, BEFORE + column.place] = self[column.name]
             if column.derivative:
                 rows[:, BEFORE + width + column.place] = self[column.name].derivative
-        parameters = tuple(Parameter(name, value, unit) for name, (value, unit) in self.parameters.items())
+        parameters = tuple(TraceParameter(name, value, unit) for name, (value, unit) in self.parameters.items())
         nominal = {n: {"nominal": self[n].nominal} for n in names if self[n].nominal is not None}
         energy = {"/audit/energy": {"nominal": self["audit.energy"].nominal or 0.0}}
         closing = [name for name in ("final", "met", "judged") if name in self.attributes]

@@ -44,7 +44,7 @@ class Column:
 
 
 @dataclass(frozen=True, slots=True)
-class Parameter:
+class TraceParameter:
     """A parameter as the trace keeps it."""
 
     name: str
@@ -59,7 +59,7 @@ class Layout:
     columns: tuple[Column, ...]
     observed: int
     attributes: dict[str, str | float | int]
-    parameters: tuple[Parameter, ...]
+    parameters: tuple[TraceParameter, ...]
 
 
 def columns_of(description: Description) -> tuple[Column, ...]:
@@ -95,7 +95,7 @@ def input_output(path: Path) -> Iterator[None]:
         raise TraceError(f"{path}: {in_words(error)}") from error
 
 
-def _keep(group: Any, parameters: Sequence[Parameter]) -> None:
+def _keep(group: Any, parameters: Sequence[TraceParameter]) -> None:
     """A scalar data set with its unit each: a netlist has tens of thousands, and a copy costs a third of a new one."""
     from sysdyn.runtime.trace import hdf5
 

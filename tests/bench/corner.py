@@ -12,9 +12,9 @@ from pathlib import Path
 ROOT = Path(__file__).resolve().parents[2]
 CORNER = {
     "positions, linkages": ["compiler/network/positions.py"],
-    "islands": ["compiler/network/ungrounded.py"],
+    "islands": ["compiler/network/floating_parts.py"],
     "initially, overlaps": ["compiler/network/primal/overlaps.py"],
-    "unsaid": ["compiler/network/primal/unspecified.py"],
+    "unsaid": ["compiler/network/primal/store_guesses.py"],
     "rings": ["compiler/network/primal/cycles.py"],
     "contents": ["compiler/network/primal/contents.py"],
     "floating": ["compiler/forms/relative_coordinates.py"],

@@ -13,7 +13,7 @@ from pathlib import Path
 import numpy as np
 from sysdyn.cli.run.events import plan
 from sysdyn.cli.run.request import targets
-from sysdyn.cli.run.request.asked import Request, options_of, stops
+from sysdyn.cli.run.request.run_request import RunRequest, options_of, stops
 from sysdyn.cli.run.request.sizes import sizes
 from sysdyn.cli.run.running import ready, rest
 from sysdyn.cli.run.start.starting import start
@@ -64,7 +64,7 @@ class Bench:
         report = Report()
         self.trace = folder / "trace.h5"
         settings = (*sizes(str(path))[1], *settings)
-        request = Request(str(path), "reference", formulation=formulation, output=str(self.trace), settings=settings)
+        request = RunRequest(str(path), "reference", formulation=formulation, output=str(self.trace), settings=settings)
         target = targets.one(targets.read(str(path), report), str(path), None, "reference", report)
         assert target is not None, [d.message for d in report.diagnostics]
         with ex.fresh():

@@ -13,7 +13,7 @@ import tempfile
 from dataclasses import dataclass
 from pathlib import Path
 
-from sysdyn.cli.run.request.asked import Request
+from sysdyn.cli.run.request.run_request import RunRequest
 from sysdyn.cli.run.running import run
 from sysdyn.dsl.text.diagnostics import Report
 
@@ -87,7 +87,7 @@ def missed(shot: Shot, folder: Path) -> tuple[bool, float]:
     path = folder / "pushed.sd"
     path.write_text(shot.text, encoding="utf-8")
     report = Report()
-    ran = run(Request(str(path), method=shot.method, output=str(folder / "trace.h5"), max_wall="60"), report)
+    ran = run(RunRequest(str(path), method=shot.method, output=str(folder / "trace.h5"), max_wall="60"), report)
     assert ran is not None, [d.message for d in report.diagnostics]
     if ran.outcome.failure is not None:
         return False, float("nan")

@@ -26,7 +26,7 @@ import numpy as np
 sys.path.insert(0, str(Path(__file__).parent))
 from measuring import MODELS
 from sysdyn.cli.run.request import targets
-from sysdyn.cli.run.request.asked import Request, options_of
+from sysdyn.cli.run.request.run_request import RunRequest, options_of
 from sysdyn.cli.run.running import ready
 from sysdyn.cli.run.start.starting import start
 from sysdyn.dsl.model import expression as ex
@@ -60,7 +60,7 @@ class Line:
         path = MODELS / "benchmark" / f"{name}.sd" if isinstance(name, str) else name
         scene, report = "reference" if isinstance(name, str) else None, Report()
         settings = (("n", str(n)),)
-        request = Request(str(path), scene, output=str(folder / "trace.h5"), settings=settings)
+        request = RunRequest(str(path), scene, output=str(folder / "trace.h5"), settings=settings)
         target = targets.one(targets.read(str(path), report), str(path), None, scene, report)
         assert target is not None
         with ex.fresh():

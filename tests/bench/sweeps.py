@@ -13,9 +13,9 @@ import time
 from pathlib import Path
 
 import numpy as np
-from sysdyn.cli.run.many.loaded import Loaded
-from sysdyn.cli.run.request.asked import Request
-from sysdyn.cli.sweep.in_core import Cases
+from sysdyn.cli.run.many.reusable_model import Loaded
+from sysdyn.cli.run.request.run_request import RunRequest
+from sysdyn.cli.sweep.core_cases import Cases
 from sysdyn.dsl.text.diagnostics import Report
 from sysdyn.runtime.many.asked import NotApplicableError
 
@@ -29,7 +29,7 @@ TIMES, SINGLES = 5, 8
 
 def row(name: str, parameter: str | None, runs: int, keep: str, until: str | None = None) -> str:
     """One line: microseconds of CPU a run in the core, of integration alone, and their ratio."""
-    loaded = Loaded(Request(str(SEED / f"{name}.sd"), accuracy=1e-4, until=until))
+    loaded = Loaded(RunRequest(str(SEED / f"{name}.sd"), accuracy=1e-4, until=until))
     known = loaded.first.prepared.binding.values
     some = [p.name for p in loaded.first.prepared.network.parameters if not p.shape and not p.whole and known[p.name]]
     parameter = parameter or some[0]

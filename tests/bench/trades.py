@@ -19,9 +19,9 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from sysdyn.cli.run.request.asked import Request
+from sysdyn.cli.run.request.run_request import RunRequest
 from sysdyn.cli.run.running import run
-from sysdyn.cli.trade.traded import cheapest
+from sysdyn.cli.trade.trade_results import cheapest
 from sysdyn.cli.trade.trading import trade
 from sysdyn.dsl.text.diagnostics import Report
 
@@ -47,7 +47,7 @@ def at_instants(name: str, entry: dict[str, Any], folder: Path) -> str:
 
 def values(file: str, entry: dict[str, Any], folder: Path, **how: Any) -> tuple[dict[str, Any], dict[str, float]]:
     """A run at the book's instants, and the magnitudes of what it traces."""
-    ran = run(Request(file, scene="reference", output=str(folder / "run.h5"), **how), Report())
+    ran = run(RunRequest(file, scene="reference", output=str(folder / "run.h5"), **how), Report())
     assert ran is not None
     trace, t = ran.outcome.traced, np.array(entry["t"])
     rows = np.searchsorted(trace.time, t + 1e-9 * t[-1], side="right") - 1
@@ -63,7 +63,7 @@ def apart(one: dict[str, Any], other: dict[str, Any], nominal: dict[str, float])
 def rows(name: str, accuracies: list[float], entry: dict[str, Any], folder: Path) -> list[str]:
     """A line an accuracy."""
     file = at_instants(name, entry, folder)
-    full = trade(Request(file, scene="reference"), Report(), folder, full=True)
+    full = trade(RunRequest(file, scene="reference"), Report(), folder, full=True)
     assert full is not None
     spent = sum(m.work - m.fixed for m in full.measured)
     known = full.reference.uncertainty
@@ -80,7 +80,7 @@ def rows(name: str, accuracies: list[float], entry: dict[str, Any], folder: Path
         there.append(apart(found, finest, nominal) / true)
     lines = []
     for accuracy in accuracies:
-        tried = trade(Request(file, scene="reference", accuracy=accuracy), Report(), folder)
+        tried = trade(RunRequest(file, scene="reference", accuracy=accuracy), Report(), folder)
         best = cheapest(full.measured, accuracy, known)
         if tried is None or tried.chosen is None or best is None:
             lines.append(f"{name:18s} {accuracy:8.0e} nothing chosen")

@@ -1,9 +1,9 @@
 """Equations as `sysdyn equations` prints them."""
 
 import numpy as np
-from sysdyn.cli.analysis.asked import compile_target
+from sysdyn.cli.analysis.operating_point import compile_target
 from sysdyn.cli.main import run
-from sysdyn.cli.run.request.asked import Request
+from sysdyn.cli.run.request.run_request import RunRequest
 from sysdyn.dsl.model.calculus import without_signals
 from sysdyn.dsl.model.evaluation import evaluate
 from sysdyn.dsl.text.diagnostics import Report
@@ -22,7 +22,7 @@ def printed(capsys, name, *options):
 
 def model(name, formulation):
     report = Report()
-    made = compile_target(Request(str(SEED / f"{name}.sd"), formulation=formulation, backend="numpy"), report)
+    made = compile_target(RunRequest(str(SEED / f"{name}.sd"), formulation=formulation, backend="numpy"), report)
     return None if made is None else made[1].compiled
 
 

@@ -3,9 +3,9 @@
 import re
 
 import pytest
-from sysdyn.cli.spice.devices import Scope, Values
-from sysdyn.cli.spice.model_text import DEVICES, Writer
-from sysdyn.cli.spice.netlist import Unreadable, cards
+from sysdyn.cli.spice.devices import CircuitScope, ModelValues
+from sysdyn.cli.spice.model_text import DEVICES, ModelTextWriter
+from sysdyn.cli.spice.netlist import UnreadableCard, cards
 from sysdyn.cli.spice.reading import Reader
 from sysdyn.cli.spice.temperature import Heat
 from sysdyn.cli.spice.windings import Cores, coupled_coils
@@ -14,19 +14,19 @@ from sysdyn.dsl.text.source import SourceText
 
 THERMAL = 1.380649e-23 * 300.15 / 1.602176634e-19  # V: k T/q at 27 Celsius
 MODELS = {
-    "dm": Values("d", {"is": 2e-14, "n": 1.5, "rs": 4.0}),
-    "plain": Values("d", {"is": 1e-14, "cjo": 1e-12}),
-    "qn": Values("npn", {"is": 1e-15, "bf": 50.0, "br": 3.0, "nf": 1.25}),
-    "qp": Values("pnp", {"is": 1e-15}),
-    "mn": Values("nmos", {"kp": 3e-5, "vto": 0.75, "lambda": 0.02}),
-    "m2": Values("nmos", {"level": 2.0}),
+    "dm": ModelValues("d", {"is": 2e-14, "n": 1.5, "rs": 4.0}),
+    "plain": ModelValues("d", {"is": 1e-14, "cjo": 1e-12}),
+    "qn": ModelValues("npn", {"is": 1e-15, "bf": 50.0, "br": 3.0, "nf": 1.25}),
+    "qp": ModelValues("pnp", {"is": 1e-15}),
+    "mn": ModelValues("nmos", {"kp": 3e-5, "vto": 0.75, "lambda": 0.02}),
+    "m2": ModelValues("nmos", {"level": 2.0}),
 }
 
 
 def scope(*names, uic=False, known=None, written=None):
     labels = {n: n for n in names} | {f"param {n}": f"p_{n}" for n in written or {}}
     node = {"0": "ground"}
-    return Scope(
+    return CircuitScope(
         lambda n: node.get(n, n), labels, known or {}, MODELS.get, ("V", 1e-3, 1.0), uic, Heat(), written=written or {}
     )
 
@@ -133,7 +133,7 @@ def test_field_effect_transistors():
     assert given(line, "beta") == pytest.approx(3e-5 * 10.0 * 3.0, rel=1e-14, abs=0.0)
     assert (given(line, "vto"), given(line, "lambda")) == (0.75, 0.02)
     assert given(element("m1 d g s 0 mn").lines[0], "beta") == 3e-5  # as wide as long
-    with pytest.raises(Unreadable, match="level=2"):
+    with pytest.raises(UnreadableCard, match="level=2"):
         element("m1 d g s 0 m2")
 
 
@@ -156,7 +156,7 @@ def test_sources_have_a_direct_part_or_a_shape():
     assert element("v2 a 0 dc 5 ac 1").lines == ("v2: voltage(v = 5 V) a -> ground",)
     assert element("v2 a 0").lines == ("v2: voltage(v = 0 V) a -> ground",)
     assert "2*pi*(50 Hz)" in element("i1 a 0 dc 1 sin(0 2 50)").lines[0]
-    with pytest.raises(Unreadable, match="are known"):
+    with pytest.raises(UnreadableCard, match="are known"):
         element("v2 a 0 1 2")
 
 
@@ -169,7 +169,7 @@ def test_coupled_coils_are_one_element():
     asked = coupled_coils(one, scope("k1", uic=True), Cores([one], coils))
     assert asked.initial == ("init k1.one.f = 2 A", "init k1.two.f = 0 A")
     again = card("k2 l2 l1 0.4")
-    with pytest.raises(Unreadable, match="l1 and l2 are coupled already"):
+    with pytest.raises(UnreadableCard, match="l1 and l2 are coupled already"):
         coupled_coils(again, scope("k1", "k2"), Cores([one, again], coils))
 
 
@@ -186,7 +186,7 @@ def test_coupled_coils_are_one_element():
     ],
 )
 def test_what_a_card_cannot_say(text, said):
-    with pytest.raises(Unreadable, match=re.escape(said)):
+    with pytest.raises(UnreadableCard, match=re.escape(said)):
         element(text)
 
 
@@ -195,7 +195,7 @@ def test_what_a_card_cannot_say(text, said):
 
 def written(text):
     source, report = SourceText("n.cir", text), Report()
-    made = Writer(Reader(source, report).netlist, source, report).text()
+    made = ModelTextWriter(Reader(source, report).netlist, source, report).text()
     return made, [(d.code, d.message) for d in report]
 
 

@@ -11,7 +11,7 @@ from sysdyn.compiler.equations import matrices
 from sysdyn.compiler.equations.algebra import Algebra
 from sysdyn.compiler.equations.book import BLOCKS, equations
 from sysdyn.compiler.equations.matrices import canonical, rows_of, underlying, unknowns
-from sysdyn.compiler.equations.order import Order
+from sysdyn.compiler.equations.order import FactorOrder
 from sysdyn.compiler.equations.pieces import pieces
 from sysdyn.dsl.model import expression as ex
 from sysdyn.dsl.model.calculus import derivative
@@ -33,7 +33,7 @@ def test_what_is_printed_is_what_is_compiled(name):
             made = model(name, formulation)
             if made is None:
                 continue
-            order = Order([p.name for p in made.network.parameters])
+            order = FactorOrder([p.name for p in made.network.parameters])
             found = [e for e in equations(Algebra(order), made.functions, made.form, 1000) if e.kind != "kinematic"]
             rows = [k for k, row in enumerate(made.form.rows) if row.block in BLOCKS]
             by_row = [list(group) for _, group in itertools.groupby(found, key=lambda e: (e.kind, e.owner))]
@@ -64,7 +64,7 @@ def test_the_underlying_equations_solve_the_rows(name, formulation):
     """Rates and multipliers printed against a numerical solution of the rows that they come from."""
     with ex.fresh():
         form = model(name, formulation).form
-        found = underlying(Algebra(Order()), form)
+        found = underlying(Algebra(FactorOrder()), form)
         rows = rows_of(form, "dynamics", "momentum_rate", "phi_acceleration", "psi_rate")
         kinds = (("f", 1), ("p", 1), ("kappa", 0), ("mu", 0))
         wanted = [n for kind, order in kinds for n in unknowns(form, kind, order)]
@@ -89,7 +89,7 @@ def test_the_canonical_equations_are_derivatives_of_h(name):
     """q' = dH/dp, and p' + dH/dq holds what is no conservative effort: the same at any momenta."""
     with ex.fresh():
         made = model(name, "hamiltonian")
-        function, found = canonical(Algebra(Order()), made.functions, made.form)
+        function, found = canonical(Algebra(FactorOrder()), made.functions, made.form)
         h = ex.add(*(t.expression for t in function.terms))
         carriers = [f.owner for f in made.form.families if f.kind == "p"]
         values = Values(4)

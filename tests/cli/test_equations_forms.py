@@ -6,15 +6,15 @@ import re
 import pytest
 import sympy
 from printed_equations import SEED, Values, model, printed
-from sysdyn.cli.analysis.asked import compile_target
+from sysdyn.cli.analysis.operating_point import compile_target
 from sysdyn.cli.main import run
-from sysdyn.cli.run.request.asked import Request
+from sysdyn.cli.run.request.run_request import RunRequest
 from sysdyn.compiler.equations import matrices
 from sysdyn.compiler.equations.algebra import Algebra
 from sysdyn.compiler.equations.book import classes
 from sysdyn.compiler.equations.elements import elements
 from sysdyn.compiler.equations.matrices import rows_of
-from sysdyn.compiler.equations.order import Order
+from sysdyn.compiler.equations.order import FactorOrder
 from sysdyn.compiler.forms.momenta import momentum
 from sysdyn.dsl.model import expression as ex
 from sysdyn.dsl.model.calculus import derivative
@@ -165,8 +165,8 @@ def test_elements_have_their_state_functions_side_by_side(capsys):
 def test_a_law_that_is_not_linear_has_its_content_by_the_legendre_transform(capsys):
     """D + G = e f at the diode's law, dD/df = e and dG/de = f (Legendre), at numbers."""
     with ex.fresh():
-        _, prepared = compile_target(Request(str(SEED / "diode_circuit.sd"), backend="numpy"), Report())
-        found = {e.left[0].expression.data: e for e in elements(Algebra(Order()), prepared.network)}
+        _, prepared = compile_target(RunRequest(str(SEED / "diode_circuit.sd"), backend="numpy"), Report())
+        found = {e.left[0].expression.data: e for e in elements(Algebra(FactorOrder()), prepared.network)}
         values = {ex.param("Is"): 0.3, ex.param("a"): 1.7, ex.param("e_diode"): 0.8}
         of = lambda name: evaluate(  # noqa: E731
             [ex.add(*(t.expression for t in found[name].right))], values.__getitem__
@@ -188,7 +188,7 @@ def test_efforts_by_class_add_up_to_the_balance(name, formulation):
         if made is None:
             return
         sums = {}
-        for e in classes(Algebra(Order()), made.energies, made.form):
+        for e in classes(Algebra(FactorOrder()), made.energies, made.form):
             sums.setdefault(e.owner, []).extend(t.expression for t in e.right)
         rows = {row.owner: row.expression for row in rows_of(made.form, "dynamics")}
         known = Values(5)

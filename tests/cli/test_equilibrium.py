@@ -9,7 +9,7 @@ from sysdyn import api
 from sysdyn.cli.analysis import resting
 from sysdyn.cli.main import run
 from sysdyn.cli.progress import SEARCH, ProgressLine
-from sysdyn.cli.run.request.asked import Request
+from sysdyn.cli.run.request.run_request import RunRequest
 from sysdyn.dsl.text.diagnostics import Report
 from sysdyn.runtime.linear import rest
 from texts import ROOT, run_json, write
@@ -250,7 +250,7 @@ def test_a_long_search_says_how_far_it_is(tmp_path, monkeypatch):
     path = write(tmp_path, DUFFING)
     clock = iter(np.arange(0.0, 1e4, 2.0))
     monkeypatch.setattr(resting, "time", SimpleNamespace(monotonic=lambda: float(next(clock))))
-    found = resting.equilibria(Request(str(path)), 9, Report(), lambda done, left: told.append((done, left)))
+    found = resting.equilibria(RunRequest(str(path)), 9, Report(), lambda done, left: told.append((done, left)))
     assert found is not None
     assert [done for done, _ in told] == [k / 10 for k in range(10)]
     for k, (_, left) in list(enumerate(told))[1:]:  # one look a point: 2 s each, and as many as are left

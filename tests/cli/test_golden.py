@@ -287,7 +287,7 @@ def deadly(asked):
 
 def test_a_check_that_is_killed_costs_no_other(project):
     some = [golden for golden in book.find(Path("golden"), ()) if golden.label in ("pendulum/swing", "spring/ring")]
-    asked = [jobs.Asked(golden, (), (), ("c",), False) for golden in some]
+    asked = [jobs.GoldenJob(golden, (), (), ("c",), False) for golden in some]
     found = {case.golden: case for cases in jobs.in_processes(asked, 2, deadly) for case in cases}
     assert found["pendulum/swing"].exit == 5
     assert "killed by signal 9" in found["pendulum/swing"].message

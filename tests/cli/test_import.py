@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 from sysdyn.api import simulate
 from sysdyn.cli.main import run
-from sysdyn.cli.spice.netlist import Unreadable, number, value
+from sysdyn.cli.spice.netlist import UnreadableCard, number, value
 from sysdyn.cli.spice.writing import quantity
 
 NETLISTS = Path(__file__).with_name("netlists")
@@ -41,7 +41,7 @@ def test_expressions(text, wanted):
      "{9^9^9^9}", "{" + "(" * 300, "{r if r else 1}", "{f(1)}", "{1;2}", "{" + "1+" * 400 + "1}"],
 )  # fmt: skip
 def test_hostile_expressions_are_refused(text):
-    with pytest.raises(Unreadable):
+    with pytest.raises(UnreadableCard):
         value(text, {"r": 1.0})
 
 

@@ -9,14 +9,14 @@ import pytest
 from sysdyn.cli.report import balance
 from sysdyn.cli.run.start.starting import holds
 from sysdyn.cli.run.verdict.expectations import judge, watch
-from sysdyn.cli.sweep.kept import Block, Done, Kept
 from sysdyn.cli.sweep.results import write
-from sysdyn.cli.verify.verified import Run, Verified, disagreements, worst
+from sysdyn.cli.sweep.run_records import Done, Kept, KeptRuns
+from sysdyn.cli.verify.verify_results import Verified, VerifiedRun, disagreements, worst
 from sysdyn.dsl import load
 from sysdyn.dsl.model import expression as ex
 from sysdyn.dsl.model.evaluation import evaluate
 from sysdyn.dsl.text.diagnostics import Report, SourceText
-from sysdyn.runtime.judgement import Judgement, NotMet
+from sysdyn.runtime.judgement import Judgement, Shortfall
 from sysdyn.runtime.trace.trace import Quantity, Trace
 
 NAN, INF = float("nan"), float("inf")
@@ -134,9 +134,9 @@ def run(name, values, *, inaccurate=False):
     kept = {n: Quantity(n, np.asarray(v, float), "m", 1.0, None) for n, v in (
         ("x", values), ("audit.energy", [0.0, -3.0, 2.0]), ("audit.constraints", [0.0, 1e-9, 0.0]))}  # fmt: skip
     trace = Trace("", time, {}, {}, kept, ())
-    missed = (NotMet("accuracy", "x", 1.0, 1e-3, None, None, ""),) if inaccurate else ()
+    missed = (Shortfall("accuracy", "x", 1.0, 1e-3, None, None, ""),) if inaccurate else ()
     judgement = replace(Judgement(True, ()), not_met=missed)
-    return Run("lagrangian", name, 1e-3, SimpleNamespace(judgement=judgement), (), trace, None)
+    return VerifiedRun("lagrangian", name, 1e-3, SimpleNamespace(judgement=judgement), (), trace, None)
 
 
 BOUNDS = {"x": 1e-2}
@@ -276,7 +276,7 @@ def test_runs_of_a_sweep_stand_in_their_own_places_however_they_were_made(tmp_pa
     ended = {"end": {"x": 1.5}, "least": {"x": 0.0}, "most": {"x": 2.0}}
     done.take(Kept(1, 3, False, "the solver stopped", "radau", None, 7, 0.25, **ended, time=[0.0, 1.0],
                   traces={"x": [0.0, 1.5]}))  # fmt: skip
-    done.take(Block(
+    done.take(KeptRuns(
         np.array([3, 2]), ("x",), "dopri", np.array([1e-5, 1e-6]), np.array([40, 30]), np.array([0.5, 0.125]),
         np.array([[33.0], [22.0]]), np.zeros((2, 0)), np.zeros((2, 0)), np.array([0.0, 1.0, 2.0]),
         np.array([[[3.0, 3.1, 3.2]], [[2.0, 2.1, 2.2]]]),

@@ -84,12 +84,12 @@ def test_the_scene_wins(tmp_path, statement, how):
     text = PENDULUM.replace("time 0 s to 1 s", f"time 0 s to 1 s\n  {statement}")
     write(tmp_path, text)
     path = Path(f"{file}.lock")
-    from sysdyn.cli.run.request.asked import Request
     from sysdyn.cli.run.request.lock import hashes
+    from sysdyn.cli.run.request.run_request import RunRequest
     from sysdyn.cli.run.request.targets import target_of
     from sysdyn.dsl.text.diagnostics import Report
 
-    now = hashes(target_of(Request(file), Report()))["model.sd"]
+    now = hashes(target_of(RunRequest(file), Report()))["model.sd"]
     before = tomllib.loads(path.read_text())["files"]["model.sd"]
     path.write_text(path.read_text().replace(before, now))
     assert ran(file)[:3] == how

@@ -124,9 +124,9 @@ def test_page_of_an_entry_holds_what_its_text_declares(entry, capsys):
     assert max(map(len, page.splitlines())) <= 132
     if entry.kind == "component":
         for statement in entry.item.body:
-            if isinstance(statement, (syntax.Param, syntax.Input)):
+            if isinstance(statement, (syntax.ParamStatement, syntax.InputStatement)):
                 assert f"\n  {statement.decl.name} " in page
-            if isinstance(statement, syntax.Port):
+            if isinstance(statement, syntax.PortStatement):
                 assert all(f"{d.name} ({statement.domain.name})" in page for d in statement.decls)
 
 

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from sysdyn.api import simulate
 from sysdyn.cli.main import run
-from sysdyn.cli.spice.model_text import Writer
+from sysdyn.cli.spice.model_text import ModelTextWriter
 from sysdyn.cli.spice.reading import Reader
 from sysdyn.cli.spice.writing import format_fast
 from sysdyn.dsl.format.format import format_text
@@ -286,7 +286,7 @@ def test_many_elements_take_work_in_proportion():
 
         sys.setprofile(count_them)
         try:
-            format_fast(Writer(Reader(source, Report()).netlist, source, Report()).text())
+            format_fast(ModelTextWriter(Reader(source, Report()).netlist, source, Report()).text())
         finally:
             sys.setprofile(None)
         return count
@@ -317,5 +317,5 @@ def test_subcircuits_within_each_other(inside, tmp_path, capsys):
 def test_the_layout_is_the_formatters(name):
     """Also of runs of plain statements, which go by it."""
     source, report = SourceText("n.cir", f"t\n{CIRCUITS[name][0]}"), Report()
-    text = Writer(Reader(source, report).netlist, source, report).text()
+    text = ModelTextWriter(Reader(source, report).netlist, source, report).text()
     assert format_fast(text) == format_text(text)

@@ -5,9 +5,9 @@ import json
 
 import numpy as np
 import pytest
-from sysdyn.cli.analysis.asked import compile_target
+from sysdyn.cli.analysis.operating_point import compile_target
 from sysdyn.cli.main import run
-from sysdyn.cli.run.request.asked import Request
+from sysdyn.cli.run.request.run_request import RunRequest
 from sysdyn.compiler.equations.matrices import NoSuchEquations, rows_of
 from sysdyn.compiler.equations.port_hamiltonian import port_hamiltonian
 from sysdyn.compiler.forms.momenta import momentum
@@ -28,7 +28,7 @@ PASSIVE = (
 def viewed(path, formulation):
     """The view of a file's scene, the compiled model and a function that gives numbers to nodes."""
     report = Report()
-    made = compile_target(Request(str(path), formulation=formulation, backend="numpy"), report)
+    made = compile_target(RunRequest(str(path), formulation=formulation, backend="numpy"), report)
     assert made is not None, [d.message for d in report.diagnostics]
     _, prepared = made
     model = prepared.compiled

@@ -13,7 +13,7 @@ from sysdyn.cli.reduce import activity
 from sysdyn.cli.reduce.activity import variation
 from sysdyn.cli.reduce.sankey import flows
 from sysdyn.cli.run.request import targets
-from sysdyn.cli.run.request.asked import Request
+from sysdyn.cli.run.request.run_request import RunRequest
 from sysdyn.dsl.text.diagnostics import Report
 from sysdyn.runtime.comparison.arrays import arrays_of
 from sysdyn.runtime.comparison.compare import compare
@@ -309,7 +309,7 @@ def test_a_drivetrain_of_forty_elements(tmp_path, capsys):
 def test_energies_go_from_bus_to_bus(tmp_path):
     file = write(tmp_path, DRIVE)
     report = Report()
-    request = Request(file)
+    request = RunRequest(file)
     target = targets.one(targets.read(file, report), file, None, None, report)
     found = activity.activities(request, target, report, tmp_path, 0.0, None)
     where = flows(found.items)

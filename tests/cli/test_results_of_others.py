@@ -146,12 +146,12 @@ def _begun(model):
     """The first line of the journal of this sweep."""
     from sysdyn.cli.sweep import journal
 
-    lines, kept = [], journal.Journal._line
-    journal.Journal._line = lambda self, item: (lines.append(item), kept(self, item))[1]
+    lines, kept = [], journal.SweepJournal._line
+    journal.SweepJournal._line = lambda self, item: (lines.append(item), kept(self, item))[1]
     try:
         assert run(["sweep", "-q", model, *OVER, "-o", "other.h5"]) == 0
     finally:
-        journal.Journal._line = kept
+        journal.SweepJournal._line = kept
     return (json.dumps(lines[0]) + "\n").encode()
 
 

@@ -20,11 +20,11 @@ from sysdyn.cli.run import module_check
 from sysdyn.cli.run.many import memory
 from sysdyn.cli.run.start.contradiction import inconsistent
 from sysdyn.cli.spice import sources
-from sysdyn.cli.spice.writing import Unreadable
+from sysdyn.cli.spice.writing import UnreadableCard
 from sysdyn.cli.streams import Closed, standing_streams
 from sysdyn.cli.trade import work
 from sysdyn.cli.trade.errors import error_of
-from sysdyn.compiler.binding.sampled import Points, Sample
+from sysdyn.compiler.binding.sampled_rows import Points, Sample
 from sysdyn.dsl.text.diagnostics import Report
 from sysdyn.dsl.text.source import SourceText
 from sysdyn.runtime.comparison.arrays import Arrays
@@ -135,7 +135,7 @@ def test_points_of_a_source_must_ascend():
     assert (found.component, found.local) == ("piecewise_current", True)
     assert found.arguments == "n = 2, at = [0 s, 1 ms], i = [1 A, 3 A]"
     for wrong in ([0.0, 1.0], [0.0, 1.0, 0.0, 2.0], [0.0, 1.0, 1.0]):
-        with pytest.raises(Unreadable):
+        with pytest.raises(UnreadableCard):
             sources.SHAPES["pwl"](wrong, TRAN)
     assert sources.direct(3.0, "V").expression == "3 V"
 

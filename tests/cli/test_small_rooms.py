@@ -6,7 +6,7 @@ import pytest
 from sysdyn.cli.failures import UsageError
 from sysdyn.cli.memory_limit import LEAST, TooLittle
 from sysdyn.cli.page.columns import align, fit_columns
-from sysdyn.cli.page.named import destination, label, quantities
+from sysdyn.cli.page.figure_sources import destination, label, quantities
 
 
 def test_a_process_without_room_for_numpy_is_told_how_much_it_takes():

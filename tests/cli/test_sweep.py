@@ -14,11 +14,11 @@ import pytest
 from sysdyn import api
 from sysdyn.cli.failures import UsageError
 from sysdyn.cli.main import run
-from sysdyn.cli.run.request.asked import Request
+from sysdyn.cli.run.request.run_request import RunRequest
 from sysdyn.cli.sweep import workers
 from sysdyn.cli.sweep.axes import Axis, axis
-from sysdyn.cli.sweep.journal import Journal
-from sysdyn.cli.sweep.kept import Kept
+from sysdyn.cli.sweep.journal import SweepJournal
+from sysdyn.cli.sweep.run_records import Kept
 from sysdyn.cli.sweep.study import study
 from texts import LADDER
 
@@ -239,7 +239,7 @@ def deadly(pipe, request, keep):
 
 @pytest.mark.long
 def test_a_run_that_kills_its_worker_is_named_and_nothing_else_is_lost(tmp_path):
-    request = Request("none.sd", output=str(tmp_path / "marker"))
+    request = RunRequest("none.sd", output=str(tmp_path / "marker"))
     found = {k.run: k for k in workers.results(request, [(n, {}) for n in range(12)], 12, 2, "end", deadly)}
     assert sorted(found) == list(range(12))
     assert found[3].exit == 4
@@ -270,14 +270,14 @@ def test_kill_9_loses_the_runs_under_way_alone(spring, capsys):
 
 
 def test_a_journal_of_another_study_is_not_taken(tmp_path):
-    with Journal(tmp_path / "a.h5", "one") as journal:
+    with SweepJournal(tmp_path / "a.h5", "one") as journal:
         journal.take(Kept(0, 0, True, end={"x": 1.0}))
     path = tmp_path / ".a.h5.runs"
     path.write_text(path.read_text() + '{"run": 1, "ex')  # cut short by a kill
-    with Journal(tmp_path / "a.h5", "one") as journal:
+    with SweepJournal(tmp_path / "a.h5", "one") as journal:
         assert journal.done.singles == {0: Kept(0, 0, True, end={"x": 1.0})}
     with pytest.raises(UsageError, match="another study"):
-        Journal(tmp_path / "a.h5", "two")
+        SweepJournal(tmp_path / "a.h5", "two")
 
 
 def test_names_that_are_texts_stay_texts():

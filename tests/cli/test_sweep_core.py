@@ -9,9 +9,9 @@ import h5py
 import numpy as np
 import pytest
 from sysdyn.cli.main import run
-from sysdyn.cli.run.many.loaded import Loaded
-from sysdyn.cli.run.request.asked import Request
-from sysdyn.cli.sweep.in_core import Cases
+from sysdyn.cli.run.many.reusable_model import Loaded
+from sysdyn.cli.run.request.run_request import RunRequest
+from sysdyn.cli.sweep.core_cases import Cases
 from sysdyn.cli.sweep.one_run import Runner
 from sysdyn.dsl.text.diagnostics import Report
 from sysdyn.runtime.many.asked import NotApplicableError
@@ -49,7 +49,7 @@ def varied(loaded, names, runs, seed=0):
 @pytest.mark.one_in(30)
 def test_runs_in_the_core_are_single_runs(name, keep):
     """End values and extrema within the accuracy of 1e-4 that both promise, and equal in any order and company."""
-    loaded = Loaded(Request(str(MODELS / "seed" / f"{name}.sd"), accuracy=1e-4))
+    loaded = Loaded(RunRequest(str(MODELS / "seed" / f"{name}.sd"), accuracy=1e-4))
     names, cases = varied(loaded, SEEDS[name], 12)
     core = Cases(loaded, names, keep)
     block, left = core.run(range(12), cases)
@@ -76,7 +76,7 @@ def test_runs_in_the_core_are_single_runs(name, keep):
 @pytest.mark.long
 def test_what_is_met_is_within_the_accuracy(name):
     """End values against runs at 1e-9, parameters spread by 10 %: within 1e-4 of the largest, all of them."""
-    loaded = Loaded(Request(str(MODELS / "seed" / f"{name}.sd"), accuracy=1e-4))
+    loaded = Loaded(RunRequest(str(MODELS / "seed" / f"{name}.sd"), accuracy=1e-4))
     names, cases = varied(loaded, (), 5, 3)
     nominal = loaded.first.prepared.binding.values
     cases = [{n: nominal[n] + 5.0 * (v - nominal[n]) for n, v in case.items()} for case in cases]
@@ -93,7 +93,7 @@ def test_small_swings_meet_the_closed_form(tmp_path):
     """th(T) of a pendulum released at 1e-3 rad: th_0 cos(sqrt(g/l) T) to 1e-6; of amplitudes from 1e-3 to 1.5 rad the
     accuracy is kept though magnitudes differ by 1000 from the nominal run's.
     """
-    loaded = Loaded(Request(str(MODELS / "seed" / "pendulum.sd"), until="3"))
+    loaded = Loaded(RunRequest(str(MODELS / "seed" / "pendulum.sd"), until="3"))
     core = Cases(loaded, ["th_0"], "end")
     amplitudes = [1e-3, 1e-2, 0.5, 1.5]
     block, left = core.run(range(4), [{"th_0": a} for a in amplitudes])
@@ -107,12 +107,12 @@ def test_small_swings_meet_the_closed_form(tmp_path):
 
 def test_what_is_another_structure_is_left_to_a_run_of_its_own():
     """No mass, a negative one, a rest without direction: no result in the core, and the others stand."""
-    loaded = Loaded(Request(str(MODELS / "seed" / "pendulum.sd")))
+    loaded = Loaded(RunRequest(str(MODELS / "seed" / "pendulum.sd")))
     cases = [{"m": 1.0, "th_0": 0.2}, {"m": 0.0, "th_0": 0.2}, {"m": -1.0, "th_0": 0.2}, {"m": 2.0, "th_0": 0.0}]
     block, left = Cases(loaded, ["m", "th_0"], "end").run(range(4), cases)
     assert left == [1, 2, 3]
     assert block.runs.tolist() == [0]
-    kept = Runner(Request(str(MODELS / "seed" / "pendulum.sd")))(3, cases[3])
+    kept = Runner(RunRequest(str(MODELS / "seed" / "pendulum.sd")))(3, cases[3])
     assert kept.met
 
 
@@ -121,7 +121,7 @@ def test_what_is_another_structure_is_left_to_a_run_of_its_own():
     [("bouncing_ball", "g", "events"), ("redundant_pendulum", "m", "minimum_norm")],
 )
 def test_why_not(name, parameter, why):
-    loaded = Loaded(Request(str(MODELS / "seed" / f"{name}.sd")))
+    loaded = Loaded(RunRequest(str(MODELS / "seed" / f"{name}.sd")))
     with pytest.raises(NotApplicableError, match=why):
         Cases(loaded, [parameter], "end")
 
@@ -158,7 +158,7 @@ def test_results_are_equal_bit_for_bit_whoever_runs_them(tmp_path, monkeypatch):
 @pytest.mark.long
 def test_runs_in_the_core_pass_no_line_of_python_each(effort):
     """A period of the pendulum at 1e-4, end values: 10000 runs a second of a core (tests/bench/sweeps.py)."""
-    loaded = Loaded(Request(str(MODELS / "seed" / "pendulum.sd"), until="3.07"))
+    loaded = Loaded(RunRequest(str(MODELS / "seed" / "pendulum.sd"), until="3.07"))
     core = Cases(loaded, ["th_0"], "end")
     cases = [{"th_0": float(a)} for a in np.linspace(0.05, 0.5, 500)]
     lines = [effort(lambda n=n: core.run(range(n), cases[:n]))[1] for n in (100, 100, 500)]

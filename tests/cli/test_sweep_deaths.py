@@ -16,10 +16,10 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 from sysdyn.api import load
-from sysdyn.cli.run.request.asked import Request
+from sysdyn.cli.run.request.run_request import RunRequest
 from sysdyn.cli.sweep import workers
-from sysdyn.cli.sweep.kept import Kept
 from sysdyn.cli.sweep.one_run import Runner
+from sysdyn.cli.sweep.run_records import Kept
 from sysdyn.cli.sweep.workers import answer
 
 LONG = bool(os.environ.get("SYSDYN_LONG"))
@@ -46,7 +46,7 @@ scene s of fall {
 def fall(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     Path("fall.sd").write_text(FALL)
-    return Request(str(tmp_path / "fall.sd"))
+    return RunRequest(str(tmp_path / "fall.sd"))
 
 
 def tasks():

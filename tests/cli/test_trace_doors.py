@@ -13,7 +13,7 @@ import h5py
 import numpy as np
 import pytest
 from sysdyn.cli.main import run
-from sysdyn.cli.sweep.opened import Sweep
+from sysdyn.cli.sweep.sweep_results import Sweep
 from sysdyn.runtime.model.failures import TraceError
 from sysdyn.runtime.trace.claim import claimed
 from sysdyn.runtime.trace.opening import replaceable

@@ -20,10 +20,10 @@ from schema import NUMBER, conforms, envelope
 from scipy.integrate import solve_ivp
 from sysdyn import api
 from sysdyn.cli.main import run
-from sysdyn.cli.run.request.asked import Request
+from sysdyn.cli.run.request.run_request import RunRequest
 from sysdyn.cli.run.running import run as simulate
 from sysdyn.cli.trade.search import tolerance
-from sysdyn.cli.trade.traded import Combination, Measured, cheapest, frontier
+from sysdyn.cli.trade.trade_results import Combination, Measured, cheapest, frontier
 from sysdyn.cli.trade.trading import trade
 from sysdyn.dsl.text.diagnostics import Report
 from sysdyn.runtime.trace.trace import Trace
@@ -110,7 +110,7 @@ def true_error(file, m, entry, folder):
     """Of one setting, by the book's values."""
     c = m.combination
     how = {"formulation": c.formulation, "index": c.index, "method": c.method, "rtol": m.tolerance}
-    ran = simulate(Request(str(file), scene="reference", output=str(folder / "run.h5"), **how), Report())
+    ran = simulate(RunRequest(str(file), scene="reference", output=str(folder / "run.h5"), **how), Report())
     trace, t = ran.outcome.traced, np.array(entry["t"])
     rows = np.searchsorted(trace.time, t + 1e-9 * t[-1], side="right") - 1
     wanted = entry["values"]
@@ -125,7 +125,7 @@ BOOK = ["dc_motor", "fluid_tank", *(["nonlinear_spring", "thermal_two_node", "lc
 def test_stated_errors_are_those_of_the_book(tmp_path, references, name):
     entry = references[name]
     file = at_the_instants_of_the_book(name, entry, tmp_path)
-    found = trade(Request(str(file), scene="reference"), Report(), tmp_path)
+    found = trade(RunRequest(str(file), scene="reference"), Report(), tmp_path)
     known = found.reference.uncertainty
     assert known < 1e-8
     compared = [m for m in found.measured if m.usable and 10.0 * known < m.error < 0.5]
@@ -147,11 +147,11 @@ SEARCHED += [("dc_motor", "lagrangian"), ("diode_circuit", "co_lagrangian")] if 
 @pytest.mark.long
 def test_the_search_finds_what_the_full_product_does(tmp_path, name, formulation):
     """Twelve models in all formulations: tests/bench/trades.py."""
-    request = Request(str(SEED / f"{name}.sd"), scene="reference", formulation=formulation)
+    request = RunRequest(str(SEED / f"{name}.sd"), scene="reference", formulation=formulation)
     full = trade(request, Report(), tmp_path, full=True)
     spent = sum(m.work - m.fixed for m in full.measured)
     for accuracy in (1e-2, 1e-4, 1e-6):
-        thrifty = Request(str(SEED / f"{name}.sd"), scene="reference", formulation=formulation, accuracy=accuracy)
+        thrifty = RunRequest(str(SEED / f"{name}.sd"), scene="reference", formulation=formulation, accuracy=accuracy)
         found = trade(thrifty, Report(), tmp_path)
         best = cheapest(full.measured, accuracy, full.reference.uncertainty)
         assert found.chosen.error + found.reference.uncertainty <= accuracy
@@ -365,7 +365,7 @@ def test_a_scene_without_rows_of_its_own_is_judged_where_it_varies(tmp_path):
     """Peaks of 20 ms in 250 s, which an even grid steps over; the true error by SciPy."""
     how = {"formulation": "lagrangian", "method": "radau"}
     file = write(tmp_path, RELAXATION)
-    chosen = trade(Request(file, **how), Report(), tmp_path).chosen
+    chosen = trade(RunRequest(file, **how), Report(), tmp_path).chosen
     output = tmp_path / "out.h5"
     trace = api.simulate(file, **how, index=chosen.combination.index, rtol=chosen.tolerance, output=output)
     right = solve_ivp(

@@ -5,7 +5,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from sysdyn.runtime.comparison.arrays import Arrays
-from sysdyn.runtime.comparison.verdict import About, Event
+from sysdyn.runtime.comparison.verdict import About, TraceEvent
 
 SPAN = 10.0
 
@@ -73,7 +73,7 @@ def bouncing():
         rates,
         {"h": "m", "w": "m/s"},
         {"h": 0.25, "w": 0.5},
-        tuple(Event(float(hit), "floor") for hit in hits),
+        tuple(TraceEvent(float(hit), "floor") for hit in hits),
     )
 
 
@@ -120,7 +120,7 @@ def _wild(value, rows):
 
 
 def _shifted_event(b, by):
-    events = tuple(Event(e.time + by * (k == 2), e.name) for k, e in enumerate(b.events))
+    events = tuple(TraceEvent(e.time + by * (k == 2), e.name) for k, e in enumerate(b.events))
     return replace(b, events=events) if b.events else None
 
 
@@ -285,9 +285,9 @@ MUTANTS: dict[str, Callable[[Base], Base | None]] = {
     "shifted jump": lambda b: _shifted_jump(b, 1e-4),
     "lost event": lambda b: replace(b, events=b.events[1:]) if b.events else None,
     "no events": lambda b: replace(b, events=()) if b.events else None,
-    "one event more": lambda b: replace(b, events=(*b.events, Event(9.5, "floor"))),
-    "another event": lambda b: replace(b, events=(Event(1.0, "ceiling"), *b.events[1:])) if b.events else None,
-    "event at nan": lambda b: replace(b, events=(Event(np.nan, "floor"), *b.events[1:])) if b.events else None,
+    "one event more": lambda b: replace(b, events=(*b.events, TraceEvent(9.5, "floor"))),
+    "another event": lambda b: replace(b, events=(TraceEvent(1.0, "ceiling"), *b.events[1:])) if b.events else None,
+    "event at nan": lambda b: replace(b, events=(TraceEvent(np.nan, "floor"), *b.events[1:])) if b.events else None,
     "1e-12 where there is nothing": lambda b: None if _turns(b) else b.with_value(np.full(b.time.size, 1.1e-12), "q"),
     "the second quantity off": lambda b: b.with_value(list(b.values.values())[1] + 0.01, list(b.values)[1]),
 }

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from corpus import BASES, MUTANTS, SPAN, mutants
 from sysdyn.cli.compare.diffing import differences
-from sysdyn.runtime.comparison.verdict import Event, Incomparable, Tolerance
+from sysdyn.runtime.comparison.verdict import Incomparable, Tolerance, TraceEvent
 
 DEFAULT = Tolerance()
 
@@ -81,7 +81,7 @@ def test_jumps_and_events_within_the_time_tolerance_are_equal():
     pairs = np.flatnonzero(np.diff(time) == 0.0)
     for k, pair in enumerate(pairs):
         time[[pair, pair + 1]] += 1e-5 * (-1) ** k
-    moved = tuple(Event(e.time + 1e-5 * (-1) ** k, e.name) for k, e in enumerate(right.events))
+    moved = tuple(TraceEvent(e.time + 1e-5 * (-1) ** k, e.name) for k, e in enumerate(right.events))
     other = replace(right, time=time, events=moved)
     assert not verdict(right, other).equal
     assert verdict(right, other, Tolerance(tau=1.1e-5)).equal
@@ -94,12 +94,14 @@ def test_events_of_one_instant_have_no_order():
     right = BASES["bouncing"]()
     first, *others = right.events
     names = ("D1", "D2", "D3")
-    one = replace(right, events=(*(Event(first.time, n) for n in names), *others))
-    two = replace(right, events=(*(Event(first.time + k * 1e-7, n) for k, n in enumerate(reversed(names))), *others))
+    one = replace(right, events=(*(TraceEvent(first.time, n) for n in names), *others))
+    two = replace(
+        right, events=(*(TraceEvent(first.time + k * 1e-7, n) for k, n in enumerate(reversed(names))), *others)
+    )
     assert verdict(one, two, Tolerance(tau=1e-6)).equal
     assert verdict(two, one, Tolerance(tau=1e-6)).equal
     assert not verdict(one, two, Tolerance(tau=1e-8)).equal
-    other = replace(right, events=(*(Event(first.time, n) for n in ("D1", "D2", "D4")), *others))
+    other = replace(right, events=(*(TraceEvent(first.time, n) for n in ("D1", "D2", "D4")), *others))
     assert not verdict(one, other, Tolerance(tau=1e-6)).equal
 
 

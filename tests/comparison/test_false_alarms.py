@@ -13,7 +13,7 @@ from pathlib import Path
 import pytest
 from sysdyn.cli.compare.diffing import common, differences, headline
 from sysdyn.cli.run.request import targets
-from sysdyn.cli.run.request.asked import Request
+from sysdyn.cli.run.request.run_request import RunRequest
 from sysdyn.cli.run.request.sizes import sizes
 from sysdyn.cli.run.running import Ran, run
 from sysdyn.cli.verify.twins import free_quantities
@@ -82,7 +82,7 @@ def runs(name, folder):
             output = str(folder / f"{formulation}-{method}-{accuracy:g}-{backend}.h5")
             options = {"accuracy": accuracy, "backend": backend, "output": output, "max_wall": WALL}
             report = Report()
-            ran = run(Request(path, scene, None, formulation, method, settings=sizes(path)[1], **options), report)
+            ran = run(RunRequest(path, scene, None, formulation, method, settings=sizes(path)[1], **options), report)
             if ran is None and {d.code for d in report} & set(REFUSALS):
                 break  # not expressible
             assert ran is not None, (setting, [d.message for d in report])

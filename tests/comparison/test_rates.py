@@ -4,7 +4,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from sysdyn.cli.run.request.asked import Request
+from sysdyn.cli.run.request.run_request import RunRequest
 from sysdyn.cli.run.running import run
 from sysdyn.dsl.text.diagnostics import Report
 from sysdyn.runtime.trace.trace import Trace
@@ -25,7 +25,7 @@ MODELS = Path(__file__).resolve().parents[2] / "models"
 def test_rates_that_no_equation_determines_are_not_stored(tmp_path, monkeypatch, file, formulation, known, unknown):
     monkeypatch.setenv("SYSDYN_CACHE", str(tmp_path / "cache"))
     output = str(tmp_path / "out.h5")
-    run(Request(str(MODELS / file), formulation=formulation, output=output, backend="numpy"), Report())
+    run(RunRequest(str(MODELS / file), formulation=formulation, output=output, backend="numpy"), Report())
     trace = Trace.open(output)
     assert {name for name in trace.names if trace[name].derivative is not None} == known
     assert {name for name in trace.names if trace[name].derivative is None} == unknown
@@ -43,7 +43,7 @@ def test_of_two_flows_whose_difference_alone_is_differentiated_no_rate_is_truste
     for accuracy in (1e-4, 1e-8):
         output = str(tmp_path / f"{accuracy}.h5")
         file = str(MODELS / "gallery" / "co_circuit.sd")
-        run(Request(file, "settle", None, "co_lagrangian", "radau", accuracy=accuracy, output=output), Report())
+        run(RunRequest(file, "settle", None, "co_lagrangian", "radau", accuracy=accuracy, output=output), Report())
         traces.append(Trace.open(output))
     assert traces[0]["v1"].derivative is not None
     assert traces[0]["v2"].derivative is None

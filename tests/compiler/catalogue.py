@@ -8,13 +8,13 @@ from sysdyn.dsl.model.network import (
     Constraint,
     Coordinate,
     Dynamic,
-    Energy,
+    EnergyTerm,
     Network,
     Observation,
     Parameter,
     State,
     Unknown,
-    Work,
+    VirtualWork,
 )
 from sysdyn.dsl.model.units import Unit
 from sysdyn.dsl.text.diagnostics import SourceText
@@ -81,8 +81,10 @@ def network(entry, model, *, energy="T*"):
         coordinates=tuple(Coordinate(f"x{k}", (), False, ONE, ONE, ONE, ONE, None, PLACE) for k in range(1, n + 1)),
         unknowns=tuple(Unknown(name, (), ONE, PLACE) for name in model["implicit"]),
         states=tuple(State(name, (), ONE, PLACE) for name in model["s"]),
-        energies=tuple(Energy(f, node(text), (), PLACE) for f, text in functions),
-        works=tuple(Work(node(text), x.var(f"x{k}", "q"), (), PLACE) for k, text in enumerate(model["applied"], 1)),
+        energies=tuple(EnergyTerm(f, node(text), (), PLACE) for f, text in functions),
+        works=tuple(
+            VirtualWork(node(text), x.var(f"x{k}", "q"), (), PLACE) for k, text in enumerate(model["applied"], 1)
+        ),
         constraints=tuple(
             Constraint(kind, f"{kind}{k}", (), node(text), (), ONE, PLACE) for kind, k, text in constraints
         ),

@@ -6,14 +6,14 @@ from sysdyn.dsl.model import expression as x
 from sysdyn.dsl.model.network import (
     Constraint,
     Coordinate,
-    Energy,
+    EnergyTerm,
     Expectation,
-    Initial,
+    InitialCondition,
     Loop,
     Network,
     Observation,
     Parameter,
-    Work,
+    VirtualWork,
 )
 
 
@@ -74,19 +74,19 @@ def chain(n=10):
         ),
         coordinates=(coordinate("x", shape), coordinate("y", shape)),
         energies=(
-            Energy("T*", kinetic, (each,), PLACE),
-            Energy("V", x.mul(x.param("k"), spring), (), PLACE),
-            Energy("D", x.mul(x.const(0.1), x.power(f("x", size), x.const(2))), (), PLACE),
+            EnergyTerm("T*", kinetic, (each,), PLACE),
+            EnergyTerm("V", x.mul(x.param("k"), spring), (), PLACE),
+            EnergyTerm("D", x.mul(x.const(0.1), x.power(f("x", size), x.const(2))), (), PLACE),
         ),
-        works=(Work(x.mul(x.const(-9.81), mass), q("y", i), (each,), PLACE),),
+        works=(VirtualWork(x.mul(x.const(-9.81), mass), q("y", i), (each,), PLACE),),
         constraints=(
             Constraint("phi", "link", (i,), link, (later,), ONE, PLACE),
             Constraint("phi", "link", (one,), first, (), ONE, PLACE),
         ),
         initials=(
-            Initial(q("x", i), x.mul(x.param("l"), i), True, (each,), PLACE),
-            Initial(q("y", size), x.const(0.5), False, (), PLACE),
-            Initial(x.mul(q("x", i), q("y", i)), x.const(0.0), True, (later,), PLACE),
+            InitialCondition(q("x", i), x.mul(x.param("l"), i), True, (each,), PLACE),
+            InitialCondition(q("y", size), x.const(0.5), False, (), PLACE),
+            InitialCondition(x.mul(q("x", i), q("y", i)), x.const(0.0), True, (later,), PLACE),
         ),
         observations=(
             Observation("tip", q("x", size), ONE, "tip", PLACE),

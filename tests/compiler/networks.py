@@ -15,7 +15,7 @@ from sysdyn.dsl.model.network import (
     Branch,
     Coupling,
     Domain,
-    Initial,
+    InitialCondition,
     Loop,
     NodeFamily,
     Observation,
@@ -102,7 +102,8 @@ class Net:
         watched = [Observation(text, n, ONE, text, PLACE) for text, n in parts.pop("observe", {}).items()]
         sizes = tuple(parameter(n, v, whole=n in ("n", "m", "k")) for n, v in parts.pop("params", {}).items())
         start = tuple(
-            Initial(target, node(value), True, ranges(loops), PLACE) for target, value, *loops in parts.pop("init", ())
+            InitialCondition(target, node(value), True, ranges(loops), PLACE)
+            for target, value, *loops in parts.pop("init", ())
         )
         return blank(
             parameters=sizes,

@@ -4,9 +4,9 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from sysdyn.cli.run.many.loaded import Loaded
-from sysdyn.cli.run.request.asked import Request
-from sysdyn.compiler.binding.again import again
+from sysdyn.cli.run.many.reusable_model import Loaded
+from sysdyn.cli.run.request.run_request import RunRequest
+from sysdyn.compiler.binding.rebinding import rebind
 from sysdyn.dsl.model import expression as ex
 
 MODELS = Path(__file__).parents[2] / "models"
@@ -20,7 +20,7 @@ NAMES = (
 @pytest.mark.parametrize("name", NAMES)
 @pytest.mark.long
 def test_equals_a_binding_made_anew(name):
-    loaded = Loaded(Request(str(MODELS / f"{name}.sd"), scene="reference" if "seed" in name else "launch")).first
+    loaded = Loaded(RunRequest(str(MODELS / f"{name}.sd"), scene="reference" if "seed" in name else "launch")).first
     compiled, binding = loaded.prepared.compiled, loaded.prepared.binding
     scalars = [k for k, v in binding.values.items() if np.ndim(v) == 0]
     ways = 0
@@ -31,7 +31,7 @@ def test_equals_a_binding_made_anew(name):
             if way is None:
                 continue
             ways += 1
-            one, other = again(binding, way, numbers), compiled.bind(numbers)
+            one, other = rebind(binding, way, numbers), compiled.bind(numbers)
         assert one is not None
         assert np.array_equal(one.p, other.p)
         assert one.values.keys() == other.values.keys()
@@ -42,14 +42,14 @@ def test_equals_a_binding_made_anew(name):
 
 @pytest.mark.long
 def test_sizes_have_no_way():
-    loaded = Loaded(Request(str(MODELS / "benchmark" / "rc_ladder.sd"), scene="reference")).first
+    loaded = Loaded(RunRequest(str(MODELS / "benchmark" / "rc_ladder.sd"), scene="reference")).first
     with ex.fresh(loaded.nodes):
         assert loaded.prepared.compiled.way(loaded.prepared.binding, frozenset(["n"])) is None
 
 
 def test_values_that_make_no_sense_are_left_to_the_binding():
-    loaded = Loaded(Request(str(MODELS / "seed" / "pendulum.sd"), scene="reference")).first
+    loaded = Loaded(RunRequest(str(MODELS / "seed" / "pendulum.sd"), scene="reference")).first
     with ex.fresh(loaded.nodes):
         way = loaded.prepared.compiled.way(loaded.prepared.binding, frozenset(["l"]))
         assert way is not None
-        assert again(loaded.prepared.binding, way, {"l": float("nan")}) is None
+        assert rebind(loaded.prepared.binding, way, {"l": float("nan")}) is None

@@ -6,14 +6,14 @@ from catalogue import ONE, PLACE
 from networks import ELECTRICAL, TRANSLATION, Net, compiled, matched, of, poles
 from sysdyn.compiler.network.along import along
 from sysdyn.compiler.network.dead_branches import dead_branches
+from sysdyn.compiler.network.floating_parts import add_references
 from sysdyn.compiler.network.influence import influences_on, links
 from sysdyn.compiler.network.quadratures import massive
 from sysdyn.compiler.network.skeleton import fill_shape, shape_of
-from sysdyn.compiler.network.stated import ALL, as_elements
-from sysdyn.compiler.network.ungrounded import add_references
+from sysdyn.compiler.network.written_energies import ALL, as_elements
 from sysdyn.dsl.model import expression as x
 from sysdyn.dsl.model.evaluation import evaluate
-from sysdyn.dsl.model.network import Dynamic, Energy, State
+from sysdyn.dsl.model.network import Dynamic, EnergyTerm, State
 
 pytestmark = pytest.mark.usefixtures("fresh")
 
@@ -103,7 +103,7 @@ def test_an_energy_of_a_difference_is_a_spring():
     for name in "ab":
         net.node(name, TRANSLATION)
     u = x.sub(of("a", "nq"), of("b", "nq"))
-    energy = Energy("V", x.mul(x.const(1.5), u, u, u), (), PLACE)
+    energy = EnergyTerm("V", x.mul(x.const(1.5), u, u, u), (), PLACE)
     found = as_elements(net.network(energies=(energy,)), ALL)
     (b,) = found.branches
     assert not found.energies
@@ -116,7 +116,7 @@ def test_an_energy_of_a_sum_of_nodes_is_no_element():
     for name in "ab":
         net.node(name, TRANSLATION)
     u = x.add(of("a", "nq"), of("b", "nq"))
-    found = as_elements(net.network(energies=(Energy("V", x.mul(u, u), (), PLACE),)), ALL)
+    found = as_elements(net.network(energies=(EnergyTerm("V", x.mul(u, u), (), PLACE),)), ALL)
     assert not found.branches
     assert len(found.energies) == 1
 
@@ -128,7 +128,7 @@ def test_coupled_inductances_are_laws_that_read_each_other():
         net.node(name, ELECTRICAL)
         field(net, f"l{name}", name)
     one, two = of("la", "bf"), of("lb", "bf")
-    energy = Energy("T*", x.add(x.mul(one, one), x.mul(one, two), x.scale(3.0, x.mul(two, two))), (), PLACE)
+    energy = EnergyTerm("T*", x.add(x.mul(one, one), x.mul(one, two), x.scale(3.0, x.mul(two, two))), (), PLACE)
     found = as_elements(net.network(energies=(energy,)), ALL)
     known = {"la.bf": 2.0, "lb.bf": 5.0}
     laws = [value(named(found)[name].law, **known) for name in ("la", "lb")]

@@ -10,7 +10,7 @@ from catalogue import ONE, PLACE
 from chains import blank, chain, coordinate, parameter
 from sysdyn.compiler.pipeline import compile_network
 from sysdyn.dsl.model import expression as x
-from sysdyn.dsl.model.network import Constraint, ElementSetting, Energy, Initial, Loop
+from sysdyn.dsl.model.network import Constraint, ElementSetting, EnergyTerm, InitialCondition, Loop
 from sysdyn.dsl.text.diagnostics import ModelError
 
 pytestmark = pytest.mark.usefixtures("fresh")
@@ -22,8 +22,8 @@ def oscillator(parameters, stiffness, **more):
         parameters=parameters,
         coordinates=(coordinate("a"),),
         energies=(
-            Energy("T*", x.power(x.var("a", "f"), x.const(2)), (), PLACE),
-            Energy("V", x.mul(stiffness, a, a), (), PLACE),
+            EnergyTerm("T*", x.power(x.var("a", "f"), x.const(2)), (), PLACE),
+            EnergyTerm("V", x.mul(stiffness, a, a), (), PLACE),
         ),
         **more,
     )
@@ -126,7 +126,7 @@ def test_cycles_are_refused():
 def test_initial_values_outside_a_family():
     i, one, n = x.index("i"), x.const(1), x.param("n")
     net = chain(4)
-    wrong = Initial(x.var("x", "q", x.add(i, one)), x.const(0), True, (Loop("i", one, n),), PLACE)
+    wrong = InitialCondition(x.var("x", "q", x.add(i, one)), x.const(0), True, (Loop("i", one, n),), PLACE)
     with pytest.raises(ModelError) as error:
         compile_network(replace(net, initials=(wrong,))).bind()
     assert codes(error) == ["E805"]
@@ -200,7 +200,7 @@ def test_indices_outside_their_family_are_e805_before_anything_reads_them():
     i, one, n = x.index("i"), x.const(1), x.param("n")
     stretch = x.power(x.sub(x.var("x", "q", i), x.var("x", "q", x.sub(i, one))), x.const(2))
     net = chain(4)
-    wrong = Energy("V", stretch, (Loop("i", one, n),), PLACE)
+    wrong = EnergyTerm("V", stretch, (Loop("i", one, n),), PLACE)
     with pytest.raises(ModelError) as error:
         compile_network(replace(net, energies=(*net.energies, wrong))).bind()
     assert [(d.code, d.message) for d in error.value.diagnostics] == [("E805", "x: index 0 outside 1..4")]

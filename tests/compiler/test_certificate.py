@@ -7,7 +7,7 @@ from networks import Net, compiled
 from sysdyn.compiler.binding.certificate import certificate
 from sysdyn.compiler.pipeline import compile_network
 from sysdyn.dsl.model import expression as x
-from sysdyn.dsl.model.network import Energy
+from sysdyn.dsl.model.network import EnergyTerm
 
 pytestmark = pytest.mark.usefixtures("fresh")
 
@@ -56,7 +56,7 @@ def test_a_content_of_two_flows_by_the_eigenvalues_of_its_matrix(shared, verdict
     u, v = x.var("x", "f"), x.var("y", "f")
     content = x.add(x.power(u, x.const(2)), x.mul(x.const(shared), u, v), x.power(v, x.const(2)))
     store = x.mul(x.const(0.5), x.add(x.power(u, x.const(2)), x.power(v, x.const(2))))
-    energies = Energy("D", content, (), PLACE), Energy("T*", store, (), PLACE)
+    energies = EnergyTerm("D", content, (), PLACE), EnergyTerm("T*", store, (), PLACE)
     found = judged(blank(coordinates=(coordinate("x"), coordinate("y")), energies=energies))
     assert (found.verdict, found.proven) == (verdict, True)
     if verdict == "active":

@@ -12,7 +12,7 @@ from sysdyn.compiler.binding.oracle import Oracle
 from sysdyn.compiler.forms.descriptor import BLOCKS, WITHOUT_ENTRIES
 from sysdyn.compiler.pipeline import compile_network
 from sysdyn.dsl.model import expression as x
-from sysdyn.dsl.model.network import Energy, Loop, Observation
+from sysdyn.dsl.model.network import EnergyTerm, Loop, Observation
 
 
 def compiled(n, formulation="lagrangian", backend="c"):
@@ -136,9 +136,9 @@ def plane(n, m):
         ),
         coordinates=(coordinate("u", shape),),
         energies=(
-            Energy("V", step, loops, PLACE),
-            Energy("V", x.reduction("sum", "i", one, rows, below), (), PLACE),
-            Energy("V", coupling, (), PLACE),
+            EnergyTerm("V", step, loops, PLACE),
+            EnergyTerm("V", x.reduction("sum", "i", one, rows, below), (), PLACE),
+            EnergyTerm("V", coupling, (), PLACE),
         ),
         observations=(Observation("total", total, ONE, "total", PLACE),),
     )
@@ -186,8 +186,8 @@ def test_momenta_cover_the_elements_that_have_a_mass(first, given, tmp_path):
             parameters=(parameter("n", 5.0, whole=True), parameter("a", float(first), whole=True)),
             coordinates=(coordinate("u", ((one, n),)),),
             energies=(
-                Energy(function, kinetic, (Loop("i", x.param("a"), n),), PLACE),
-                Energy("D", x.power(x.var("u", "f", i), x.const(2)), (Loop("i", one, n),), PLACE),
+                EnergyTerm(function, kinetic, (Loop("i", x.param("a"), n),), PLACE),
+                EnergyTerm("D", x.power(x.var("u", "f", i), x.const(2)), (Loop("i", one, n),), PLACE),
             ),
         )
         model = compile_network(net, "hamiltonian")

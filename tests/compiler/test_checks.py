@@ -7,7 +7,7 @@ from catalogue import ONE, PLACE
 from chains import blank, coordinate, parameter
 from sysdyn.compiler.pipeline import compile_network
 from sysdyn.dsl.model import expression as x
-from sysdyn.dsl.model.network import Constraint, Energy, Loop, Observation, Scene, Unknown, Work
+from sysdyn.dsl.model.network import Constraint, EnergyTerm, Loop, Observation, Scene, Unknown, VirtualWork
 from sysdyn.dsl.text.diagnostics import ModelError
 
 pytestmark = pytest.mark.usefixtures("fresh")
@@ -32,7 +32,7 @@ def square(node):
 def simple(**more):
     base = {
         "coordinates": (coordinate("a"), coordinate("b")),
-        "energies": (Energy("T*", x.add(square(f("a")), square(f("b"))), (), PLACE),),
+        "energies": (EnergyTerm("T*", x.add(square(f("a")), square(f("b"))), (), PLACE),),
     }
     return blank(**base | more)
 
@@ -56,7 +56,7 @@ def test_a_valid_model():
 def closed(*gammas, unknowns=("g", "h")):
     return simple(
         unknowns=tuple(Unknown(n, (), ONE, PLACE) for n in unknowns),
-        works=tuple(Work(e(n), q("a"), (), PLACE) for n in unknowns),
+        works=tuple(VirtualWork(e(n), q("a"), (), PLACE) for n in unknowns),
         constraints=tuple(constraint("gamma", f"law{k}", g) for k, g in enumerate(gammas)),
     )
 
@@ -78,7 +78,7 @@ def test_e504_counts_elements():
     net = simple(
         parameters=(parameter("n", 4.0, whole=True),),
         unknowns=(Unknown("g", ((one, n),), ONE, PLACE),),
-        works=(Work(e("g", i), q("a"), loops, PLACE),),
+        works=(VirtualWork(e("g", i), q("a"), loops, PLACE),),
         constraints=(constraint("gamma", "law", x.sub(e("g", i), f("a")), (i,), loops),),
     )
     assert findings(net) == [("E504", "4 implicit unknowns and 3 gamma equations: nothing closes g[1]")]
@@ -102,16 +102,16 @@ def test_e506_an_idle_effort():
 def test_e513_assertions(asserted, touched, codes):
     net = simple(coordinates=(coordinate("a", asserted=asserted), coordinate("b")))
     if touched:
-        net = replace(net, energies=(*net.energies, Energy("V", square(q("a")), (), PLACE)))
+        net = replace(net, energies=(*net.energies, EnergyTerm("V", square(q("a")), (), PLACE)))
     assert [c for c, _ in findings(net)] == codes
 
 
 def test_e516_undetermined():
     net = simple(coordinates=(coordinate("a"), coordinate("b"), coordinate("c")))
-    pushed = replace(net, works=(Work(x.const(3), q("c"), (), PLACE),))
+    pushed = replace(net, works=(VirtualWork(x.const(3), q("c"), (), PLACE),))
     assert [c for c, _ in findings(pushed)] == ["E516"]
     for node in (x.neg(q("c")), x.neg(f("c"))):
-        assert findings(replace(net, works=(Work(node, q("c"), (), PLACE),))) == []
+        assert findings(replace(net, works=(VirtualWork(node, q("c"), (), PLACE),))) == []
     assert findings(replace(net, constraints=(constraint("psi", "tie", x.sub(f("c"), f("a"))),))) == []
 
 
@@ -126,7 +126,7 @@ def test_e517_more_constraints_than_coordinates():
 
 def test_e606_no_momentum():
     def traced(name):
-        massless = (Energy("T*", square(f("a")), (), PLACE), Energy("D", square(f("b")), (), PLACE))
+        massless = (EnergyTerm("T*", square(f("a")), (), PLACE), EnergyTerm("D", square(f("b")), (), PLACE))
         return simple(energies=massless, observations=(Observation("o", x.var(name, "p"), ONE, "o", PLACE),))
 
     for formulation in ("lagrangian", "hamiltonian"):
@@ -140,8 +140,8 @@ def test_e806_an_index_that_is_not_affine():
         parameters=(parameter("n", 4.0, whole=True),),
         coordinates=(coordinate("a", ((one, x.const(16)),)), coordinate("b")),
         energies=(
-            Energy("T*", square(f("a", x.mul(i, i))), (Loop("i", one, n),), PLACE),
-            Energy("T*", square(f("b")), (), PLACE),
+            EnergyTerm("T*", square(f("a", x.mul(i, i))), (Loop("i", one, n),), PLACE),
+            EnergyTerm("T*", square(f("b")), (), PLACE),
         ),
     )
     assert findings(net) == [("E806", "index i^2 is not affine: i + c with whole c is meant")]
@@ -155,7 +155,7 @@ def test_n608_a_sum_inside_a_nonlinear_energy(literal, codes):
     net = simple(
         parameters=(parameter("n", 4.0, whole=True),),
         coordinates=(coordinate("a", ((one, n),)),),
-        energies=(Energy("V", root, (), PLACE),),
+        energies=(EnergyTerm("V", root, (), PLACE),),
     )
     assert [c for c, _ in findings(net)] == codes
 
@@ -166,7 +166,7 @@ def test_e805_a_constraint_that_is_given_twice():
     twice = [Constraint("phi", "tie", (), x.sub(q, x.const(value)), (), ONE, PLACE) for value in (1.0, 2.0)]
     network = blank(
         coordinates=(coordinate("x"),),
-        energies=(Energy("T*", x.power(x.var("x", "f"), x.const(2)), (), PLACE),),
+        energies=(EnergyTerm("T*", x.power(x.var("x", "f"), x.const(2)), (), PLACE),),
         constraints=tuple(twice),
     )
     with pytest.raises(ModelError) as caught:

@@ -7,7 +7,7 @@ from sysdyn.compiler.forms.corners import kinks
 from sysdyn.compiler.forms.corners import written as module
 from sysdyn.compiler.forms.corners.kinks import Surface, surfaces
 from sysdyn.compiler.forms.corners.written import written
-from sysdyn.compiler.forms.descriptor import Block, DescriptorForm, Equations, Kernel, Summand
+from sysdyn.compiler.forms.descriptor import Block, DescriptorForm, EquationFamily, LoopKernel, Summand
 from sysdyn.dsl.model import expression as x
 from sysdyn.dsl.model.network import Loop
 
@@ -35,11 +35,11 @@ def over(first, last, depth=0):
 
 def form(**blocks):
     """Blocks, each one kernel: (nest, expression of its only row), at the loop variables of the nest."""
-    rows = tuple(Equations(name, "a", "a", name, "N", PLACE) for name in BLOCKS)
+    rows = tuple(EquationFamily(name, "a", "a", name, "N", PLACE) for name in BLOCKS)
     made = []
     for name, (nest, expression) in blocks.items():
         at = tuple(counter(k) for k in range(len(nest)))
-        made.append(Block(name, (Kernel(tuple(nest), (Summand(BLOCKS.index(name), at, expression),)),)))
+        made.append(Block(name, (LoopKernel(tuple(nest), (Summand(BLOCKS.index(name), at, expression),)),)))
     return DescriptorForm("lagrangian", (), rows, tuple(made), (), (), (), ())
 
 

@@ -8,13 +8,13 @@ import pytest
 from networks import ELECTRICAL, TRANSLATION, Net
 from sysdyn.compiler.forms.coverage import bind_covers
 from sysdyn.compiler.network.primal.balances import balances
-from sysdyn.compiler.network.primal.bounds import Sizes, box_size
+from sysdyn.compiler.network.primal.bounds import WholeNumbers, box_size
 from sysdyn.compiler.network.primal.contents import held_at
 from sysdyn.compiler.network.primal.incidence import Incidence
 from sysdyn.compiler.network.primal.series import series
 from sysdyn.dsl.model import expression as x
+from sysdyn.dsl.model.connected_components import Joined
 from sysdyn.dsl.model.evaluation import evaluate
-from sysdyn.dsl.model.joined import Joined
 from sysdyn.dsl.model.network import Loop
 
 pytestmark = pytest.mark.usefixtures("fresh")
@@ -23,7 +23,7 @@ pytestmark = pytest.mark.usefixtures("fresh")
 def counted(net):
     """Coordinates and node rows of a network, by elements."""
     network = net.network()
-    sizes = Sizes(network)
+    sizes = WholeNumbers(network)
     incidence = Incidence(network, sizes)
     classes = series(incidence, frozenset())
     rows = balances(incidence, classes.merged).constraints

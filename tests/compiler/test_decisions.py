@@ -7,7 +7,7 @@ from networks import Net
 from sysdyn.compiler.binding.columns import following
 from sysdyn.compiler.binding.counts import match
 from sysdyn.compiler.binding.ranges import Ranges
-from sysdyn.compiler.equations.order import Order
+from sysdyn.compiler.equations.order import FactorOrder
 from sysdyn.compiler.model.parameters import Parameters
 from sysdyn.compiler.network.primal.slopes import Slopes, check_slopes
 from sysdyn.dsl.model import expression as x
@@ -82,6 +82,6 @@ def test_factors_stand_as_books_write_them():
     m, q, f = x.param("m"), x.var("x", "q"), x.var("x", "f")
     total = x.add(x.param("a"), x.param("b"))
     written = [x.const(2), total, m, x.time(), x.call("sin", q), q, f, x.var("x", "f", order=1), x.var("c", "kappa")]
-    order = Order(("a", "m"))
+    order = FactorOrder(("a", "m"))
     assert sorted(written[4:] + written[:4], key=order.rank) == written
     assert sorted([x.param("new"), m, x.param("a")], key=order.rank) == [x.param("a"), m, x.param("new")]

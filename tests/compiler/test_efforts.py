@@ -9,7 +9,7 @@ from sysdyn.compiler.forms.efforts import effort, efforts
 from sysdyn.compiler.model.energies import energies
 from sysdyn.dsl.model import expression as x
 from sysdyn.dsl.model.evaluation import evaluate
-from sysdyn.dsl.model.network import Constraint, Energy, Work
+from sysdyn.dsl.model.network import Constraint, EnergyTerm, VirtualWork
 
 pytestmark = pytest.mark.usefixtures("fresh")
 
@@ -24,11 +24,11 @@ def bead():
     return energies(blank(
         coordinates=(coordinate("r"), coordinate("th")),
         energies=(
-            Energy("T*", x.add(half(2.0, u), half(2.0, r, w)), (), PLACE),
-            Energy("V", half(3.0, r), (), PLACE),
-            Energy("D", half(1.0, w), (), PLACE),
+            EnergyTerm("T*", x.add(half(2.0, u), half(2.0, r, w)), (), PLACE),
+            EnergyTerm("V", half(3.0, r), (), PLACE),
+            EnergyTerm("D", half(1.0, w), (), PLACE),
         ),
-        works=(Work(x.const(7.0), x.mul(r, x.call("sin", th)), (), PLACE),),
+        works=(VirtualWork(x.const(7.0), x.mul(r, x.call("sin", th)), (), PLACE),),
         constraints=(
             Constraint("phi", "stop", (), x.sub(r, x.const(1)), (), ONE, PLACE),
             Constraint("psi", "gear", (), x.sub(w, x.mul(x.const(2), u)), (), ONE, PLACE),

@@ -3,19 +3,19 @@
 import pytest
 from catalogue import ONE, PLACE
 from networks import TRANSLATION, Net, of
-from sysdyn.compiler.network.primal.bounds import Sizes
+from sysdyn.compiler.network.primal.bounds import WholeNumbers
 from sysdyn.compiler.network.primal.fields import field_quantities
 from sysdyn.compiler.network.primal.incidence import Incidence
 from sysdyn.dsl.model import expression as x
 from sysdyn.dsl.model.evaluation import evaluate
-from sysdyn.dsl.model.network import Constraint, Energy, Loop, Work
+from sysdyn.dsl.model.network import Constraint, EnergyTerm, Loop, VirtualWork
 
 pytestmark = pytest.mark.usefixtures("fresh")
 
 
 def quantities(net, **written):
     network = net.network(**written)
-    efforts, momenta = field_quantities(network, Incidence(network, Sizes(network)).elements)
+    efforts, momenta = field_quantities(network, Incidence(network, WholeNumbers(network)).elements)
     return efforts[0], momenta.get(0)
 
 
@@ -32,8 +32,8 @@ def test_an_oscillator_written_as_energies():
     square = [x.mul(x.const(0.5), x.const(c), x.power(v, x.const(2))) for c, v in ((3.0, q), (0.5, f), (2.0, f))]
     effort, momentum = quantities(
         net,
-        energies=tuple(Energy(name, e, (), PLACE) for name, e in zip(("V", "D", "T*"), square, strict=True)),
-        works=(Work(x.const(7.0), q, (), PLACE),),
+        energies=tuple(EnergyTerm(name, e, (), PLACE) for name, e in zip(("V", "D", "T*"), square, strict=True)),
+        works=(VirtualWork(x.const(7.0), q, (), PLACE),),
         constraints=(Constraint("phi", "wall", (), q, (), ONE, PLACE),),
     )
     values = {q: 1.5, f: 4.0, x.var("b", "bf", order=1): 10.0, x.var("wall", "kappa"): 0.25}
@@ -48,7 +48,9 @@ def test_every_iteration_that_reads_an_element_counts():
     net.branch("b", "field", None, None, ("a", x.index("i")), loops=[("i", 1, 4)])
     k = x.index("k")
     apart = x.sub(of("b", "bq", x.add(k, x.const(1))), of("b", "bq", k))
-    energy = Energy("V", x.mul(x.const(0.5), x.power(apart, x.const(2))), (Loop("k", x.const(1), x.const(3)),), PLACE)
+    energy = EnergyTerm(
+        "V", x.mul(x.const(0.5), x.power(apart, x.const(2))), (Loop("k", x.const(1), x.const(3)),), PLACE
+    )
     effort, _ = quantities(net, energies=(energy,))
     held = {1: 0.0, 2: 1.0, 3: 5.0, 4: 7.0}
 

@@ -7,14 +7,14 @@ from catalogue import ONE, PLACE
 from chains import blank, coordinate
 from sysdyn.compiler.formulations import choose
 from sysdyn.dsl.model import expression as x
-from sysdyn.dsl.model.network import Constraint, Energy
+from sysdyn.dsl.model.network import Constraint, EnergyTerm
 
 pytestmark = pytest.mark.usefixtures("fresh")
 
 
 def written(function, *read, co=False, constraint=None):
     """One coordinate x with an energy of what is read of it."""
-    energy = Energy(function, x.mul(*(x.power(x.var("x", kind), x.const(2)) for kind in read)), (), PLACE)
+    energy = EnergyTerm(function, x.mul(*(x.power(x.var("x", kind), x.const(2)) for kind in read)), (), PLACE)
     rows = () if constraint is None else (Constraint("phi", "rod", (), constraint, (), ONE, PLACE),)
     made = replace(coordinate("x"), complementary=co)
     return blank(coordinates=(made,), energies=(energy,), constraints=rows)

@@ -13,7 +13,7 @@ from sysdyn.compiler.pipeline import compile_network
 from sysdyn.dsl.model import expression as x
 from sysdyn.dsl.model.evaluation import evaluate
 from sysdyn.dsl.model.functions import FUNCTIONS
-from sysdyn.dsl.model.network import Constraint, Dynamic, Energy, Observation, State, Unknown, Work
+from sysdyn.dsl.model.network import Constraint, Dynamic, EnergyTerm, Observation, State, Unknown, VirtualWork
 from test_verifiers import random_expression
 
 POINTS = (-2.5, -1.0, -0.3, 0.0, 0.3, 1.0, 2.5, 700.0, 720.0)
@@ -60,7 +60,7 @@ def test_functions_conditions_and_powers(tmp_path):
         found = dict(expressions())
         net = blank(
             coordinates=(coordinate("a"), coordinate("b")),
-            energies=(Energy("T*", x.add(x.power(f("a"), x.const(2)), x.power(f("b"), x.const(2))), (), PLACE),),
+            energies=(EnergyTerm("T*", x.add(x.power(f("a"), x.const(2)), x.power(f("b"), x.const(2))), (), PLACE),),
             observations=tuple(Observation(name, node, ONE, name, PLACE) for name, node in found.items()),
         )
         model = compile_network(net)
@@ -100,12 +100,12 @@ def test_random_models(seed, tmp_path):
             unknowns=(Unknown("e", (), ONE, PLACE),),
             states=(State("s", (), ONE, PLACE),),
             energies=(
-                Energy("T*", some([*qs, *fs, t], 4), (), PLACE),
-                Energy("T*", x.add(*(x.mul(n, n) for n in fs)), (), PLACE),
-                Energy("V", some([*qs, s, t], 4), (), PLACE),
-                Energy("D", some([*fs, *qs]), (), PLACE),
+                EnergyTerm("T*", some([*qs, *fs, t], 4), (), PLACE),
+                EnergyTerm("T*", x.add(*(x.mul(n, n) for n in fs)), (), PLACE),
+                EnergyTerm("V", some([*qs, s, t], 4), (), PLACE),
+                EnergyTerm("D", some([*fs, *qs]), (), PLACE),
             ),
-            works=(Work(x.add(e, some([*qs, *fs, t])), some(qs), (), PLACE),),
+            works=(VirtualWork(x.add(e, some([*qs, *fs, t])), some(qs), (), PLACE),),
             constraints=(
                 *(Constraint(kind, kind, (), node, (), ONE, PLACE) for kind, node in laws),
                 Constraint("gamma", "law", (), x.add(e, some([*qs, *fs, s])), (), ONE, PLACE),
@@ -157,11 +157,11 @@ def test_energy_balance_of_functions_of_time_and_states(formulation):
             coordinates=tuple(coordinate(n) for n in "abc"),
             states=(State("s", (), ONE, PLACE),),
             energies=(
-                Energy("T*", kinetic, (), PLACE),
-                Energy("V", x.add(x.mul(s, a, a), x.mul(t, b), x.power(c, x.const(4))), (), PLACE),
-                Energy("D", x.power(fa, x.const(4)), (), PLACE),
+                EnergyTerm("T*", kinetic, (), PLACE),
+                EnergyTerm("V", x.add(x.mul(s, a, a), x.mul(t, b), x.power(c, x.const(4))), (), PLACE),
+                EnergyTerm("D", x.power(fa, x.const(4)), (), PLACE),
             ),
-            works=(Work(x.call("exp", x.neg(t)), x.mul(a, b), (), PLACE),),
+            works=(VirtualWork(x.call("exp", x.neg(t)), x.mul(a, b), (), PLACE),),
             constraints=(
                 Constraint("phi", "drive", (), x.sub(c, x.mul(a, t)), (), ONE, PLACE),
                 Constraint(

@@ -9,7 +9,7 @@ from networks import ELECTRICAL, Net
 from sysdyn.compiler.network.primal.bounds import (
     Affine,
     Interval,
-    Sizes,
+    WholeNumbers,
     box_difference,
     box_size,
     box_union,
@@ -19,9 +19,9 @@ from sysdyn.compiler.network.primal.bounds import (
 )
 from sysdyn.compiler.network.primal.cycles import in_loops
 from sysdyn.compiler.network.primal.incidence import elements
-from sysdyn.compiler.network.primal.index_classes import End, IndexClasses, Link
+from sysdyn.compiler.network.primal.index_classes import IndexClasses, Link, LinkEnd
 from sysdyn.dsl.model import expression as x
-from sysdyn.dsl.model.joined import Joined
+from sysdyn.dsl.model.connected_components import Joined
 from sysdyn.dsl.text.diagnostics import ModelError
 
 pytestmark = pytest.mark.usefixtures("fresh")
@@ -78,7 +78,7 @@ def test_parts_have_names_of_their_own():
 def test_sizes_of_expressions_of_parameters():
     i, n = x.index("i"), x.param("n")
     square = x.mul(i, i)
-    sizes = Sizes(
+    sizes = WholeNumbers(
         blank(parameters=(parameter("n", 4.0, whole=True), parameter("a", square, ((x.const(2), n),), ("i",))))
     )
     assert sizes.bound(x.add(n, x.const(-1.0)), None).value == 3
@@ -129,7 +129,7 @@ def random_link(random, items):
             runs = room >= 0 and random.random() < 0.8
             own = int(random.integers(first, first + room + 1 if runs else last + 1))
             at.append((int(index) if runs else None, number(own)))
-        ends.append(End(which, tuple(at)))
+        ends.append(LinkEnd(which, tuple(at)))
     return Link(box(*((0, length - 1) for length in lengths)), *ends)
 
 
@@ -159,7 +159,7 @@ def test_elements_belong_together_as_if_each_link_were_followed(dimensions):
 
 def test_a_run_is_one_class_and_its_far_end_another():
     """x[1..9], x[k] = x[k+1] for k = 3..5: 3..6 are one, the others stand alone."""
-    ends = End(0, ((0, number(0)),)), End(0, ((0, number(1)),))
+    ends = LinkEnd(0, ((0, number(0)),)), LinkEnd(0, ((0, number(1)),))
     found = IndexClasses([box((1, 9))], [Link(box((3, 5)), *ends)])
     assert not found.refused
     assert sorted(plain(found.box(c))[0] for c in found.cells(0)) == [(1, 2), (3, 6), (7, 9)]
@@ -168,21 +168,21 @@ def test_a_run_is_one_class_and_its_far_end_another():
 
 def test_items_that_lie_beside_each_other_are_moved_onto_one_axis():
     """x[k] = y[k + 3] for k = 1..4, twice by other counts: no cut, no run, one class of four elements."""
-    links = [Link(box((1, 4)), End(0, ((0, number(0)),)), End(1, ((0, number(3)),)))]
-    links += [Link(box((2, 5)), End(1, ((0, number(2)),)), End(0, ((0, number(-1)),)))]
+    links = [Link(box((1, 4)), LinkEnd(0, ((0, number(0)),)), LinkEnd(1, ((0, number(3)),)))]
+    links += [Link(box((2, 5)), LinkEnd(1, ((0, number(2)),)), LinkEnd(0, ((0, number(-1)),)))]
     found = IndexClasses([box((1, 4)), box((4, 7))], links)
     assert not found.refused
     assert [[plain(found.box(c))[0] for c, _ in group] for group in found.groups().values()] == [[(1, 4), (4, 7)]]
 
 
 def test_senses_multiply_along_links():
-    a, b, c = (End(k, ()) for k in range(3))
+    a, b, c = (LinkEnd(k, ()) for k in range(3))
     found = IndexClasses([(), (), ()], [Link((), a, b, -1), Link((), b, c, -1)])
     assert [found.find((k, ()))[1] for k in range(3)] == [1, -1, 1]
 
 
 def test_a_link_over_two_steps_is_refused():
-    ends = End(0, ((0, number(0)),)), End(0, ((0, number(2)),))
+    ends = LinkEnd(0, ((0, number(0)),)), LinkEnd(0, ((0, number(2)),))
     assert IndexClasses([box((1, 9))], [Link(box((1, 7)), *ends)]).refused
 
 
@@ -193,7 +193,7 @@ def looped(make):
     net = Net()
     make(net)
     network = net.network()
-    found = elements(network, Sizes(network))
+    found = elements(network, WholeNumbers(network))
     closed = in_loops([(e.ends[0].node, e.ends[1].node, box_size(e.box)) for e in found])
     return {found[k].name for k in closed}
 

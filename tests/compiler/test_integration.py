@@ -11,7 +11,7 @@ from reference_values import load
 from sysdyn.compiler.binding.oracle import Oracle
 from sysdyn.compiler.pipeline import compile_network
 from sysdyn.dsl.model import expression as x
-from sysdyn.dsl.model.network import Constraint, Energy, Initial, Loop, Observation, Work
+from sysdyn.dsl.model.network import Constraint, EnergyTerm, InitialCondition, Loop, Observation, VirtualWork
 
 pytestmark = pytest.mark.usefixtures("fresh")
 
@@ -30,11 +30,14 @@ def node_network(psi, *, stored="b"):
         parameters=(parameter("k", 2.0), parameter("c", 0.5)),
         coordinates=tuple(coordinate(n) for n in "abd"),
         energies=(
-            Energy("V", x.mul(x.param("k"), x.power(q(stored), x.const(2))), (), PLACE),
-            *(Energy("D", x.power(f(n), x.const(2)), (), PLACE) for n in "abd"),
+            EnergyTerm("V", x.mul(x.param("k"), x.power(q(stored), x.const(2))), (), PLACE),
+            *(EnergyTerm("D", x.power(f(n), x.const(2)), (), PLACE) for n in "abd"),
         ),
         constraints=(Constraint("psi", "node", (), psi, (), ONE, PLACE),),
-        initials=(Initial(q("a"), x.const(7.0), True, (), PLACE), Initial(q("b"), x.param("k"), False, (), PLACE)),
+        initials=(
+            InitialCondition(q("a"), x.const(7.0), True, (), PLACE),
+            InitialCondition(q("b"), x.param("k"), False, (), PLACE),
+        ),
         observations=(Observation("v", x.var("node", "mu"), ONE, "v", PLACE),),
     )
 
@@ -93,13 +96,13 @@ def test_rows_of_an_array():
         parameters=(parameter("n", 5.0, whole=True),),
         coordinates=(coordinate("q", ((x.const(1), x.add(n, x.const(1))),)), coordinate("z", ((x.const(1), n),))),
         energies=(
-            Energy("V", x.power(q("z", i), x.const(2)), (Loop("i", x.const(1), n),), PLACE),
-            Energy("T*", x.power(f("q", i), x.const(2)), (Loop("i", x.const(1), x.add(n, x.const(1))),), PLACE),
+            EnergyTerm("V", x.power(q("z", i), x.const(2)), (Loop("i", x.const(1), n),), PLACE),
+            EnergyTerm("T*", x.power(f("q", i), x.const(2)), (Loop("i", x.const(1), x.add(n, x.const(1))),), PLACE),
         ),
         constraints=(Constraint("psi", "node", (i,), psi, (Loop("i", x.const(1), n),), ONE, PLACE),),
         initials=(
-            Initial(q("z", i), x.mul(i, i), True, (Loop("i", x.const(1), n),), PLACE),
-            Initial(q("q", i), i, True, (Loop("i", x.const(1), x.add(n, x.const(1))),), PLACE),
+            InitialCondition(q("z", i), x.mul(i, i), True, (Loop("i", x.const(1), n),), PLACE),
+            InitialCondition(q("q", i), i, True, (Loop("i", x.const(1), x.add(n, x.const(1))),), PLACE),
         ),
     )
     model = compile_network(net, "hamiltonian", "numpy")
@@ -121,7 +124,7 @@ def test_carriers_read_the_constants(tmp_path):
 def test_multipliers_in_laws_follow():
     psi = x.linear(0.0, ((1.0, f("a")), (-1.0, f("b")), (-1.0, f("d"))))
     net = node_network(psi)
-    friction = Work(x.neg(x.var("node", "mu")), q("a"), (), PLACE)
+    friction = VirtualWork(x.neg(x.var("node", "mu")), q("a"), (), PLACE)
     model = compile_network(replace(net, works=(friction,)))
     assert model.form.block("dynamics")
 
@@ -132,7 +135,7 @@ def test_the_book_s_circuits_integrate():
     model = dict(entry["models"][0])
     model["psi"], model["phi"] = ["f1-f2-f3"], []
     net = network(entry, model)
-    start = Initial(x.var("x2", "q"), x.param("V20"), True, (), PLACE)
+    start = InitialCondition(x.var("x2", "q"), x.param("V20"), True, (), PLACE)
     compiled = compile_network(replace(net, initials=(start,)))
     binding = compiled.bind()
     assert binding.p[binding.offsets[0][1]] == -1.0

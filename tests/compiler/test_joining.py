@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from sysdyn.compiler.equations.algebra import Algebra
 from sysdyn.compiler.equations.joining import collect_terms, shorter, shortest
-from sysdyn.compiler.equations.order import Order
+from sysdyn.compiler.equations.order import FactorOrder
 from sysdyn.dsl.model import expression as x
 from sysdyn.dsl.model.evaluation import evaluate
 from sysdyn.dsl.model.expression_text import to_text
@@ -17,7 +17,7 @@ pytestmark = pytest.mark.usefixtures("fresh")
 
 
 def algebra():
-    return Algebra(Order(PARAMETERS), map(x.param, PARAMETERS))
+    return Algebra(FactorOrder(PARAMETERS), map(x.param, PARAMETERS))
 
 
 def leaves():

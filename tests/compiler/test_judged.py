@@ -15,16 +15,16 @@ from sysdyn.compiler.forms.hamiltonian import hamiltonian
 from sysdyn.compiler.forms.lagrangian import lagrangian
 from sysdyn.compiler.forms.meters.audit import add_audit
 from sysdyn.compiler.model.energies import energies
-from sysdyn.compiler.network.primal.bounds import Sizes
+from sysdyn.compiler.network.primal.bounds import WholeNumbers
 from sysdyn.compiler.network.primal.contents import Contents
 from sysdyn.compiler.network.primal.incidence import Incidence
 from sysdyn.compiler.network.primal.reading import EliminationTable, IndexBox, Rewriter, touches_network
-from sysdyn.compiler.network.primal.unspecified import guess_contents
+from sysdyn.compiler.network.primal.store_guesses import guess_contents
 from sysdyn.compiler.pipeline import compile_network
-from sysdyn.compiler.program.rolled import skeleton
+from sysdyn.compiler.program.rerolling import skeleton
 from sysdyn.dsl.model import expression as x
 from sysdyn.dsl.model.evaluation import evaluate
-from sysdyn.dsl.model.network import Constraint, Energy, Initial, Loop, Unknown, Work
+from sysdyn.dsl.model.network import Constraint, EnergyTerm, InitialCondition, Loop, Unknown, VirtualWork
 from sysdyn.dsl.text.diagnostics import ModelError, SourceText
 
 pytestmark = pytest.mark.usefixtures("fresh")
@@ -47,9 +47,10 @@ def oscillator(**more):
     text = SourceText("m.sd", "T V D W")
     said = (("T*", 1.5, f), ("V", 2.5, q), ("D", 3.5, f))
     functions = tuple(
-        Energy(name, x.scale(c, squared(v)), (), text.place(2 * k, 2 * k + 1)) for k, (name, c, v) in enumerate(said)
+        EnergyTerm(name, x.scale(c, squared(v)), (), text.place(2 * k, 2 * k + 1))
+        for k, (name, c, v) in enumerate(said)
     )
-    work = Work(x.const(2.0), q, (), text.place(6, 7))
+    work = VirtualWork(x.const(2.0), q, (), text.place(6, 7))
     return blank(**{"coordinates": (coordinate("a"),), "energies": functions, "works": (work,), **more})
 
 
@@ -110,10 +111,10 @@ def weighted():
     """An oscillator whose stiffness k = 2 m follows from its mass and whose start is q0."""
     q, f, m = var("a", "q"), var("a", "q", order=1), x.param("m")
     energies_ = (
-        Energy("T*", x.product(0.5, [(1.0, m), (2.0, f)]), (), PLACE),
-        Energy("V", x.product(0.5, [(1.0, x.param("k")), (2.0, q)]), (), PLACE),
+        EnergyTerm("T*", x.product(0.5, [(1.0, m), (2.0, f)]), (), PLACE),
+        EnergyTerm("V", x.product(0.5, [(1.0, x.param("k")), (2.0, q)]), (), PLACE),
     )
-    begin = Initial(q, x.scale(3.0, x.param("q0")), True, (), PLACE)
+    begin = InitialCondition(q, x.scale(3.0, x.param("q0")), True, (), PLACE)
     numbers = (parameter("m", 3.0), parameter("k", x.scale(2.0, m)), parameter("q0", 0.5))
     return blank(coordinates=(coordinate("a"),), energies=energies_, initials=(begin,), parameters=numbers)
 
@@ -157,7 +158,7 @@ def test_a_coordinate_that_nothing_holds_or_moves():
 def test_an_implicit_effort_that_does_nothing():
     idle = oscillator(unknowns=(Unknown("R", (), ONE, PLACE),))
     assert codes(idle) == [("E506", "implicit effort 'R' appears in no work and in no gamma")]
-    assert codes(replace(idle, works=(*idle.works, Work(var("R", "e"), var("a", "q"), (), PLACE)))) == []
+    assert codes(replace(idle, works=(*idle.works, VirtualWork(var("R", "e"), var("a", "q"), (), PLACE)))) == []
 
 
 @pytest.mark.parametrize(("asserted", "potential"), [(False, True), (True, False)])
@@ -172,8 +173,8 @@ def test_what_is_declared_of_a_displacement_holds(asserted, potential):
 
 def test_a_momentum_that_no_store_makes():
     text = replace(oscillator(), coordinates=(coordinate("a"), coordinate("b")))
-    spring = Energy("V", squared(var("b", "q")), (), PLACE)
-    begin = Initial(var("b", "p"), x.const(1.0), True, (), PLACE)
+    spring = EnergyTerm("V", squared(var("b", "q")), (), PLACE)
+    begin = InitialCondition(var("b", "p"), x.const(1.0), True, (), PLACE)
     ((code, message),) = codes(replace(text, energies=(*text.energies, spring), initials=(begin,)))
     assert (code, message) == ("E606", "b has no momentum variable: T* has no second derivative in b'")
 
@@ -188,7 +189,7 @@ def two_pieces():
     for ohms, first, last in ((2.0, 1, 3), (7.0, 4, 5)):
         net.R("R", ohms, ("a", x.index("i")), loops=(("i", first, last),))
     network = net.network()
-    sizes = Sizes(network)
+    sizes = WholeNumbers(network)
     elements = Incidence(network, sizes).elements
     pieces = {"R": [IndexBox(e.named, e) for e in elements]}
     assert len(elements) == 2
@@ -230,7 +231,7 @@ def test_an_index_outside_all_pieces_is_said():
 def guesses(net, *initials):
     """Guesses of contents: (store, whether the text says it, value)."""
     network = replace(net.network(), initials=initials)
-    sizes = Sizes(network)
+    sizes = WholeNumbers(network)
     elements = Incidence(network, sizes).elements
     pieces = {e.name: [IndexBox(e.named, e)] for e in elements}
     momenta = {e.number: e.branch.law for e in elements if e.branch.kind == "kinetic"}
@@ -256,7 +257,7 @@ def test_a_store_on_a_coordinate_of_its_own_is_guessed_by_it():
 def test_stores_that_share_coordinates_are_measured_by_what_they_hold():
     """A mass between a and b reads both flows: all three are guessed by their momenta, M as the text says, 2*4."""
     net = masses(("M", 2.0, "a"), ("N", 3.0, "b"), ("J", 1.0, "a", "b"))
-    said = Initial(of("M", "bf"), x.const(4.0), False, (), PLACE)
+    said = InitialCondition(of("M", "bf"), x.const(4.0), False, (), PLACE)
     assert guesses(net, said) == (
         {"M": (True, 8.0), "N": (False, 0.0), "J": (False, 0.0)},
         frozenset({"M"}),

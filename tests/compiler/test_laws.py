@@ -10,7 +10,7 @@ import pytest
 from catalogue import PLACE
 from networks import ELECTRICAL, TRANSLATION, Net, of
 from numpy.polynomial.legendre import leggauss
-from sysdyn.compiler.network.primal.bounds import Sizes
+from sysdyn.compiler.network.primal.bounds import WholeNumbers
 from sysdyn.compiler.network.primal.coordinates import primal
 from sysdyn.compiler.network.primal.incidence import Incidence
 from sysdyn.compiler.network.primal.laws import laws
@@ -25,7 +25,7 @@ POINTS = (-1.3, 0.0, 0.4, 2.1)
 
 def said(net):
     network = net.network()
-    sizes = Sizes(network)
+    sizes = WholeNumbers(network)
     return laws(network, Incidence(network, sizes).elements, sizes)
 
 

@@ -10,11 +10,11 @@ from chains import blank, coordinate
 from sysdyn.compiler.forms.kane import constraints, projection
 from sysdyn.compiler.forms.minors import determinant, inverse
 from sysdyn.compiler.forms.speeds import speeds_of
-from sysdyn.compiler.model.energies import Quantity, energies
-from sysdyn.compiler.network.primal.symbolic import Algebra
+from sysdyn.compiler.model.energies import TracedQuantity, energies
+from sysdyn.compiler.network.primal.symbolic import SignedAlgebra
 from sysdyn.dsl.model import expression as x
 from sysdyn.dsl.model.evaluation import evaluate
-from sysdyn.dsl.model.network import Constraint, Energy
+from sysdyn.dsl.model.network import Constraint, EnergyTerm
 from sysdyn.dsl.text.diagnostics import ModelError
 
 pytestmark = pytest.mark.usefixtures("fresh")
@@ -58,7 +58,7 @@ def test_rows_and_columns_of_an_inverse_are_not_exchanged():
 def roots(law, w, a=2.0, b=3.0, *, positive=True):
     """The v that the candidates give at w, of a law in v, a, b."""
     v, y = x.param("v"), x.param("w")
-    algebra = Algebra(v, y, {x.param("a"): 1, x.param("b"): 1}, positive=positive)
+    algebra = SignedAlgebra(v, y, {x.param("a"): 1, x.param("b"): 1}, positive=positive)
     found = []
     for root in algebra.roots(law(v, x.param("a"), x.param("b")), over_value=False):
         try:
@@ -98,7 +98,7 @@ def test_roots_of_two_different_radicands_are_not_sought():
 
 def test_a_parameter_that_is_known_to_be_negative_keeps_its_sign():
     v, w, n = x.param("v"), x.param("w"), x.param("n")
-    algebra = Algebra(v, w, {n: -1}, positive=False)
+    algebra = SignedAlgebra(v, w, {n: -1}, positive=False)
     (root, *_) = algebra.roots(x.linear(0.0, [(-2.0, x.mul(n, v))]), over_value=False)
     assert value(root, w=6.0, n=-3.0) == pytest.approx(1.0)
 
@@ -112,9 +112,9 @@ def model(names, psi, **quasi):
     kinetic = x.mul(x.const(0.5), x.add(*(x.mul(f, f) for f in flows)))
     rows = tuple(Constraint("psi", label, (), node, (), ONE, PLACE) for label, node in psi.items())
     network = blank(
-        coordinates=tuple(map(coordinate, names)), energies=(Energy("T*", kinetic, (), PLACE),), constraints=rows
+        coordinates=tuple(map(coordinate, names)), energies=(EnergyTerm("T*", kinetic, (), PLACE),), constraints=rows
     )
-    speeds = tuple(Quantity(name, node, False, "1", PLACE) for name, node in quasi.items())
+    speeds = tuple(TracedQuantity(name, node, False, "1", PLACE) for name, node in quasi.items())
     return replace(energies(network), speeds=speeds)
 
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from catalogue import ONE, PLACE
 from chains import blank, coordinate, parameter
-from sysdyn.compiler.binding.sampled import Points, SampledRows
+from sysdyn.compiler.binding.sampled_rows import Points, SampledRows
 from sysdyn.compiler.binding.sensitivity import Sensitivity
 from sysdyn.compiler.model.integers import Index, Integers
 from sysdyn.compiler.model.magnitudes import magnitudes, rounding
@@ -14,7 +14,7 @@ from sysdyn.compiler.pipeline import compile_network
 from sysdyn.compiler.program.notation import Notation, factors, number, total
 from sysdyn.dsl.model import expression as x
 from sysdyn.dsl.model.evaluation import evaluate
-from sysdyn.dsl.model.network import Constraint, Energy, Initial, Work
+from sysdyn.dsl.model.network import Constraint, EnergyTerm, InitialCondition, VirtualWork
 from sysdyn.dsl.text.diagnostics import ModelError
 
 pytestmark = pytest.mark.usefixtures("fresh")
@@ -118,12 +118,12 @@ def oscillator(**more):
         parameters=(parameter("m", 2.0), parameter("k", x.scale(4.0, m)), parameter("c", 0.5)),
         coordinates=(coordinate("x"),),
         energies=(
-            Energy("T*", x.mul(half, m, f, f), (), PLACE),
-            Energy("V", x.mul(half, k, q, q), (), PLACE),
-            Energy("D", x.mul(half, c, f, f), (), PLACE),
+            EnergyTerm("T*", x.mul(half, m, f, f), (), PLACE),
+            EnergyTerm("V", x.mul(half, k, q, q), (), PLACE),
+            EnergyTerm("D", x.mul(half, c, f, f), (), PLACE),
         ),
-        works=(Work(x.mul(m, x.call("sin", x.time())), q, (), PLACE),),
-        initials=(Initial(q, x.div(c, m), True, (), PLACE),),
+        works=(VirtualWork(x.mul(m, x.call("sin", x.time())), q, (), PLACE),),
+        initials=(InitialCondition(q, x.div(c, m), True, (), PLACE),),
         **more,
     )
     return compile_network(network, "lagrangian", "numpy")
@@ -158,9 +158,9 @@ def test_a_parameter_that_moves_moves_the_rates_of_constraints():
     network = blank(
         parameters=(parameter("l", 1.5),),
         coordinates=(coordinate("x"),),
-        energies=(Energy("T*", x.mul(x.const(0.5), x.var("x", "f"), x.var("x", "f")), (), PLACE),),
+        energies=(EnergyTerm("T*", x.mul(x.const(0.5), x.var("x", "f"), x.var("x", "f")), (), PLACE),),
         constraints=(Constraint("phi", "rod", (), rod, (), ONE, PLACE),),
-        initials=(Initial(q, x.const(1.5), False, (), PLACE),),
+        initials=(InitialCondition(q, x.const(1.5), False, (), PLACE),),
     )
     model = compile_network(network, "lagrangian", "numpy")
     found = Sensitivity(model.form, model.bind(), model.network, "l", ())

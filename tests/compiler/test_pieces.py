@@ -7,13 +7,13 @@ from catalogue import ONE, PLACE
 from chains import blank, coordinate
 from networks import ELECTRICAL, TRANSLATION, Net, of
 from sysdyn.compiler.forms.assembly import Assembly
-from sysdyn.compiler.forms.descriptor import Equations, Unknowns
+from sysdyn.compiler.forms.descriptor import EquationFamily, Unknowns
 from sysdyn.compiler.forms.integration import integrate
 from sysdyn.compiler.forms.lowering import total_rate, whole
+from sysdyn.compiler.forms.meters.default_traces import MOST, with_coordinates_observed
 from sysdyn.compiler.forms.meters.ledgers import Entry, ledgers
-from sysdyn.compiler.forms.meters.observing import Equation, add_initials, missing, pins_and_equations
-from sysdyn.compiler.forms.meters.untraced import MOST, with_coordinates_observed
-from sysdyn.compiler.model.energies import EnergyModel, Family, Row, Target, energies
+from sysdyn.compiler.forms.meters.observing import InitialEquation, add_initials, missing, pins_and_equations
+from sysdyn.compiler.model.energies import EnergyModel, InitialTarget, Row, UnknownFamily, energies
 from sysdyn.compiler.model.terms import Term
 from sysdyn.compiler.network.authors import in_author_names, owner, split_finding
 from sysdyn.compiler.network.primal import primal
@@ -21,7 +21,7 @@ from sysdyn.compiler.network.primal.account import Step
 from sysdyn.compiler.program.formulas import canonical
 from sysdyn.dsl.model import expression as x
 from sysdyn.dsl.model.evaluation import evaluate
-from sysdyn.dsl.model.network import Energy, Initial, Loop, Observation
+from sysdyn.dsl.model.network import EnergyTerm, InitialCondition, Loop, Observation
 from sysdyn.dsl.model.rewriting import TRACED, expressions, nodes_read, rewritten
 from sysdyn.dsl.text.diagnostics import Diagnostic, SourceText
 
@@ -39,7 +39,7 @@ def test_what_is_added_to_one_row_under_one_nest_is_one_expression():
     """q + 2 q to row a, then f - f to row b, which leaves nothing; blocks come in the contract's order."""
     made, q, f = Assembly(), var("a", "q"), var("b", "f")
     for block, name in (("phi", "a"), ("dynamics", "b")):
-        made.family(Equations(block, name, name, block, "1", None))
+        made.family(EquationFamily(block, name, name, block, "1", None))
     made.add("phi", "a", (), (), q)
     made.add("phi", "a", (), (), x.scale(2.0, q))
     made.add("dynamics", "b", (), (), f)
@@ -53,7 +53,7 @@ def test_what_is_added_to_one_row_under_one_nest_is_one_expression():
 
 def test_nests_of_equal_bounds_are_one_kernel():
     made, k = Assembly(), x.index("#0")
-    made.family(Equations("dynamics", "a", "a", "dynamics", "1", None))
+    made.family(EquationFamily("dynamics", "a", "a", "dynamics", "1", None))
     three, four = ((Loop("#0", x.const(1.0), x.const(n)),) for n in (3.0, 4.0))
     for nest in (three, four, three):
         made.add("dynamics", "a", (k,), nest, x.var("a", "q", k))
@@ -68,12 +68,12 @@ def test_nests_of_equal_bounds_are_one_kernel():
 
 
 def model(*initials, **parts):
-    a, b = (Family(n, (), dict.fromkeys("qfpe", "1") | {"balance": "J"}, PLACE) for n in "ab")
+    a, b = (UnknownFamily(n, (), dict.fromkeys("qfpe", "1") | {"balance": "J"}, PLACE) for n in "ab")
     return EnergyModel((a, b), initials=initials, **parts)
 
 
 def target(node, value, **more):
-    return Target(node, x.const(value), **{"fixed": True, "nest": (), "place": PLACE, **more})
+    return InitialTarget(node, x.const(value), **{"fixed": True, "nest": (), "place": PLACE, **more})
 
 
 def unknown(owner, kind):
@@ -92,9 +92,9 @@ def test_an_unknown_is_pinned_and_an_expression_is_a_row():
 def test_a_guess_misses_what_its_row_does_not_meet():
     """a + b ~ 2 of the text, and a content of zero that nobody wrote: each row reads an unknown of its own."""
     both = x.add(var("a", "f"), var("b", "f"))
-    written = Equation("#init 0", target(both, 2.0, fixed=False))
-    content = Equation("#init 1", target(both, 0.0, fixed=False, said=False, store="C", unit="C"))
-    held = Equation("#init 2", target(both, 0.0))
+    written = InitialEquation("#init 0", target(both, 2.0, fixed=False))
+    content = InitialEquation("#init 1", target(both, 0.0, fixed=False, said=False, store="C", unit="C"))
+    held = InitialEquation("#init 2", target(both, 0.0))
     found = list(missing((written, content, held)))
     assert [(u.owner, u.kind, u.unit) for u in found] == [("#init 0", "slack", "#init 0"), ("#init 1", "unsaid", "C")]
     made = Assembly()
@@ -118,7 +118,7 @@ def test_the_total_rate_takes_rates_of_multipliers_along():
 
 def test_a_family_as_a_whole():
     shape = ((x.const(1.0), x.const(3.0)), (x.const(0.0), x.const(2.0)))
-    nest, at = whole(Family("a", shape, {}, PLACE))
+    nest, at = whole(UnknownFamily("a", shape, {}, PLACE))
     assert [(loop.index, loop.first.data, loop.last.data) for loop in nest] == [("#0", 1.0, 3.0), ("#1", 0.0, 2.0)]
     assert at == (x.index("#0"), x.index("#1"))
 
@@ -168,7 +168,7 @@ def test_parts_that_nothing_joins_keep_ledgers_of_their_own():
 
 def test_every_element_is_observed_up_to_the_most():
     array = coordinate("v", ((x.const(1.0), x.const(3.0)),))
-    network = blank(coordinates=(coordinate("u"), array), energies=(Energy("V", of("u", "q"), (), PLACE),))
+    network = blank(coordinates=(coordinate("u"), array), energies=(EnergyTerm("V", of("u", "q"), (), PLACE),))
     found, notes = with_coordinates_observed(energies(network), network)
     assert [q.name for q in found.quantities] == ["u", "v[1]", "v[2]", "v[3]"]
     assert notes == ()
@@ -204,8 +204,8 @@ def test_what_became_of_nodes_and_branches_is_told_once():
 
 def statements():
     seen = Observation("seen", of("n", "ne"), ONE, "seen", PLACE)
-    begin = Initial(of("c", "bq"), of("m", "ne"), True, (), PLACE)
-    energy = Energy("V", x.mul(of("u", "q"), of("v", "ne")), (), PLACE)
+    begin = InitialCondition(of("c", "bq"), of("m", "ne"), True, (), PLACE)
+    energy = EnergyTerm("V", x.mul(of("u", "q"), of("v", "ne")), (), PLACE)
     return blank(observations=(seen,), initials=(begin,), energies=(energy,))
 
 

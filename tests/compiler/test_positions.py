@@ -9,7 +9,7 @@ from sysdyn.compiler.network.positions import from_stores, with_positions
 from sysdyn.compiler.network.quadratures import with_quadratures
 from sysdyn.dsl.model import expression as x
 from sysdyn.dsl.model.evaluation import evaluate
-from sysdyn.dsl.model.network import Initial
+from sysdyn.dsl.model.network import InitialCondition
 
 pytestmark = pytest.mark.usefixtures("fresh")
 
@@ -21,7 +21,7 @@ def triangle(*said, **parts):
     net.node("b", TRANSLATION)
     for name, ends in (("s", ("a",)), ("t", ("b", "a")), ("u", ("b",))):
         net.C(name, 1.0, *ends)
-    initials = tuple(Initial(of(name, kind), x.const(v), fixed, (), PLACE) for name, kind, v, fixed in said)
+    initials = tuple(InitialCondition(of(name, kind), x.const(v), fixed, (), PLACE) for name, kind, v, fixed in said)
     return replace(net.network(**parts), initials=initials)
 
 
@@ -74,7 +74,7 @@ def test_positions_are_asked_where_they_tell_anything():
         net.L(f"m{name}", 1.0, name)
     bare = net.network()
     assert not with_positions(bare, frozenset()).positions
-    said = replace(bare, initials=(Initial(of("d", "nq"), x.const(1.0), False, (), PLACE),))
+    said = replace(bare, initials=(InitialCondition(of("d", "nq"), x.const(1.0), False, (), PLACE),))
     assert [p.name for p in with_positions(said, frozenset()).positions] == ["c.start", "d.start"]
     net.C("w", 1.0, "a", "b")
     assert [p.name for p in with_positions(net.network(), frozenset()).positions] == ["a.start", "b.start"]

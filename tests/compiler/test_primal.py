@@ -443,9 +443,9 @@ def test_efforts_of_field_branches_are_those_of_their_nodes():
     net.branch("F", "field", None, None, "b", of=ELECTRICAL)
     work = x.mul(x.const(2.0), of("F", "bf"), of("F", "bf"))
     from catalogue import PLACE
-    from sysdyn.dsl.model.network import Energy
+    from sysdyn.dsl.model.network import EnergyTerm
 
-    model = compiled(net.network(observe={"e": of("F", "be")}, energies=(Energy("D", work, (), PLACE),)))
+    model = compiled(net.network(observe={"e": of("F", "be")}, energies=(EnergyTerm("D", work, (), PLACE),)))
     near(poles(model), [-(1 / 2 + 1 / 3 + 1 / 4) / 0.5])
     field = Net()
     field.node("x", TRANSLATION)

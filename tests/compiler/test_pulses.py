@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from sysdyn.cli.run.request import targets
-from sysdyn.cli.run.request.asked import Request
+from sysdyn.cli.run.request.run_request import RunRequest
 from sysdyn.cli.run.running import ready
 from sysdyn.compiler.binding.pulses import pulses
 from sysdyn.dsl.model import expression as ex
@@ -23,7 +23,7 @@ def found(tmp_path, signal, known=()):
     path = tmp_path / "m.sd"
     path.write_text(Shot("gauss", 1.0, 1.0, 1.0, "auto").text.replace("set F = ", f"set F = {signal} + 0*"))
     report = Report()
-    request = Request(str(path))
+    request = RunRequest(str(path))
     target = targets.one(targets.read(str(path), report), str(path), None, None, report)
     with ex.fresh():
         prepared = ready(request, target, report)

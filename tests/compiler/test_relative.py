@@ -9,7 +9,7 @@ from sysdyn.compiler.forms.series_stores import with_efforts_of_stores
 from sysdyn.compiler.model.energies import energies
 from sysdyn.dsl.model import expression as x
 from sysdyn.dsl.model.evaluation import evaluate
-from sysdyn.dsl.model.network import Constraint, Energy, Unknown, Work
+from sysdyn.dsl.model.network import Constraint, EnergyTerm, Unknown, VirtualWork
 
 pytestmark = pytest.mark.usefixtures("fresh")
 
@@ -33,7 +33,7 @@ def f(name):
 
 def model(**functions):
     parts = {"T*": functions["kinetic"], "V": functions["potential"], "D": functions.get("content")}
-    stated = tuple(Energy(name, node, (), PLACE) for name, node in parts.items() if node is not None)
+    stated = tuple(EnergyTerm(name, node, (), PLACE) for name, node in parts.items() if node is not None)
     return energies(blank(coordinates=tuple(map(coordinate, "abc")), energies=stated))
 
 
@@ -111,11 +111,11 @@ def test_a_law_reads_the_store_in_series_with_what_it_is_of():
     y, law = x.var("y", "e"), x.sub(f("a"), x.power(x.var("y", "e"), x.const(3.0)))
     more = {
         "unknowns": (Unknown("y", (), ONE, PLACE),),
-        "works": (Work(x.neg(y), q("a"), (), PLACE, "dissipated"),),
+        "works": (VirtualWork(x.neg(y), q("a"), (), PLACE, "dissipated"),),
         "constraints": (Constraint("gamma", "law", (), law, (), ONE, PLACE),),
     }
-    spring = Energy("V", quadratic((2.0, q("a"), None)), (), PLACE)
-    mass = Energy("T*", quadratic((2.0, f("a"), None)), (), PLACE)
+    spring = EnergyTerm("V", quadratic((2.0, q("a"), None)), (), PLACE)
+    mass = EnergyTerm("T*", quadratic((2.0, f("a"), None)), (), PLACE)
     known = {"fa": 100.0, "qa": 3.0, "ey": 5.0}
     for stores, told in (((spring,), True), ((spring, mass), False)):
         made = energies(blank(coordinates=(coordinate("a"),), energies=stores, **more))

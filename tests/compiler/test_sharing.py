@@ -4,8 +4,8 @@ import math
 import random
 
 import pytest
-from sysdyn.compiler.model.integers import Reference
-from sysdyn.compiler.program.program import Assign, Fold, Routine, Store
+from sysdyn.compiler.model.integers import FamilyReference
+from sysdyn.compiler.program.program import Assign, Fold, Routine, StoreInstruction
 from sysdyn.compiler.program.sharing import share_operations
 
 UNKNOWNS = 5
@@ -20,7 +20,7 @@ def values(routine, y):
 
     for s in routine.body:
         match s:
-            case Store():
+            case StoreInstruction():
                 stored[s.place] = of(s.value)
             case Assign(op="y"):
                 known[s.target] = y[s.data]
@@ -66,7 +66,7 @@ def random_body(seed):
         else:
             body.append(Assign(number, "call", "sin", args[:1]))
         number += 1
-    return [*body, *(Store(k, k) for k in range(UNKNOWNS, number))]
+    return [*body, *(StoreInstruction(k, k) for k in range(UNKNOWNS, number))]
 
 
 @pytest.mark.parametrize("seed", range(40))
@@ -83,7 +83,7 @@ def test_values_are_the_same_but_for_round_off(seed):
 
 def test_a_product_within_two_products_is_made_once():
     body = [*read(4), Assign(4, "mul", (1.0, 1.0, 1.0), (0, 1, 2)), Assign(5, "mul", (1.0, 2.0, 1.0), (0, 1, 3))]
-    given = routine([*body, Store(0, 4), Store(1, 5)])
+    given = routine([*body, StoreInstruction(0, 4), StoreInstruction(1, 5)])
     made = share_operations(given)
     assert operations(given) == 5
     assert operations(made) == 4
@@ -94,7 +94,7 @@ def test_a_product_within_two_products_is_made_once():
 def test_what_differs_by_a_sign_or_a_power_of_two_is_one_value_to_the_last_bit():
     signs = [Assign(4, "sum", (0.0, (-1.0, -1.0)), (0, 1)), Assign(5, "sum", (0.0, (2.0, 2.0)), (0, 1))]
     products = [Assign(6, "mul", (1.0, 1.0), (4, 2)), Assign(7, "mul", (1.0, 1.0), (5, 2))]
-    given = routine([*read(4), *signs, *products, *(Store(k, 4 + k) for k in range(4))])
+    given = routine([*read(4), *signs, *products, *(StoreInstruction(k, 4 + k) for k in range(4))])
     made = share_operations(given)
     y = [0.1, 0.7, 1.3, 0.0]
     assert values(made, y) == values(given, y)
@@ -105,12 +105,12 @@ def test_what_folds_read_keeps_its_number():
     double = Assign(1, "sum", (0.0, (2.0,)), (0,))
     inner = Assign(3, "mul", (1.0, 1.0), (1, 1))
     fold = Fold(2, "sum", 0, None, None, (inner,), 3)
-    place = Reference(0, (), -1, ())
-    made = share_operations(routine([*read(1), double, fold, Store(place, 2)]))
+    place = FamilyReference(0, (), -1, ())
+    made = share_operations(routine([*read(1), double, fold, StoreInstruction(place, 2)]))
     assert [s.target for s in made.body if isinstance(s, Assign)] == [0, 1]
     assert fold in made.body
 
 
 def test_what_nobody_reads_is_left_out():
-    made = share_operations(routine([*read(2), Assign(2, "mul", (1.0, 1.0), (0, 1)), Store(0, 1)]))
+    made = share_operations(routine([*read(2), Assign(2, "mul", (1.0, 1.0), (0, 1)), StoreInstruction(0, 1)]))
     assert [s.target for s in made.body if isinstance(s, Assign)] == [1]

@@ -10,7 +10,7 @@ from sysdyn.compiler.binding.oracle import Oracle
 from sysdyn.compiler.model.tables import evaluate
 from sysdyn.compiler.pipeline import compile_network
 from sysdyn.dsl.model import expression as x
-from sysdyn.dsl.model.network import Energy, Observation, Table
+from sysdyn.dsl.model.network import EnergyTerm, Observation, Table
 
 X = (0.0, 0.3, 1.0, 1.2, 2.5, 3.0)
 Z = (1.0, 2.0, 2.5, 0.5, 0.25, 4.0)
@@ -60,7 +60,10 @@ def model_of(tables, energy, observed=()):
     return blank(
         tables=tables,
         coordinates=(coordinate("a"), coordinate("b")),
-        energies=(Energy("T*", energy, (), PLACE), Energy("V", x.power(x.var("a", "q"), x.const(2)), (), PLACE)),
+        energies=(
+            EnergyTerm("T*", energy, (), PLACE),
+            EnergyTerm("V", x.power(x.var("a", "q"), x.const(2)), (), PLACE),
+        ),
         observations=tuple(Observation(f"o{k}", o, ONE, "o", PLACE) for k, o in enumerate(observed)),
     )
 

@@ -9,8 +9,8 @@ from chains import blank, parameter
 from sysdyn.compiler.binding.counts import match
 from sysdyn.compiler.forms.conjugates import negate_conjugates, with_book_signs
 from sysdyn.compiler.forms.coverage import bind_covers, inside, outside
-from sysdyn.compiler.forms.descriptor import Block, DescriptorForm, Equations, Kernel, Pin, Summand, Unknowns
-from sysdyn.compiler.model.energies import Family
+from sysdyn.compiler.forms.descriptor import Block, DescriptorForm, EquationFamily, LoopKernel, Pin, Summand, Unknowns
+from sysdyn.compiler.model.energies import UnknownFamily
 from sysdyn.compiler.model.terms import (
     LARGEST_LITERAL,
     Term,
@@ -25,7 +25,7 @@ from sysdyn.compiler.model.terms import (
     vanishes,
     without_nested,
 )
-from sysdyn.compiler.network.primal.bounds import Affine, Interval, Picked, Sizes, number
+from sysdyn.compiler.network.primal.bounds import Affine, Interval, Picked, WholeNumbers, number
 from sysdyn.dsl.model import expression as x
 from sysdyn.dsl.model.network import Loop
 from sysdyn.dsl.text.diagnostics import ModelError
@@ -190,10 +190,10 @@ def book(formulation):
     """p = 3 f in a row of momentum, and p' = -p + 2 in one of dynamics; p begins at 5."""
     p, f = x.var("a", "p"), x.var("a", "f")
     families = tuple(Unknowns(f"a.{k}", k, "a", "1", PLACE) for k in ("f", "p"))
-    rows = tuple(Equations(name, "a", "a", name, "1", PLACE) for name in ("dynamics", "momentum"))
+    rows = tuple(EquationFamily(name, "a", "a", name, "1", PLACE) for name in ("dynamics", "momentum"))
     expressions = x.linear(-2.0, [(1.0, x.var("a", "p", order=1)), (1.0, p)]), x.linear(0.0, [(1.0, p), (-3.0, f)])
     blocks = tuple(
-        Block(r.block, (Kernel((), (Summand(k, (), e),)),))
+        Block(r.block, (LoopKernel((), (Summand(k, (), e),)),))
         for k, (r, e) in enumerate(zip(rows, expressions, strict=True))
     )
     pins = tuple(Pin(k, (), x.const(5.0), True, (), PLACE) for k in (0, 1))
@@ -239,7 +239,7 @@ def test_a_store_moves_with_a_range_of_a_family(places, ends):
 
 
 def test_the_elements_outside_a_range_lie_before_and_behind():
-    family = Family("x", ((x.const(1), x.param("n")),), {}, PLACE)
+    family = UnknownFamily("x", ((x.const(1), x.param("n")),), {}, PLACE)
     first, last = x.param("#first x"), x.param("#last x")
     assert inside("x") == (Loop("#0", first, last),)
     assert outside(family) == (
@@ -250,7 +250,7 @@ def test_the_elements_outside_a_range_lie_before_and_behind():
 
 def test_an_index_from_a_table_of_the_compiler():
     """#t = 4, 2, 9 from index 0 on."""
-    sizes = Sizes(
+    sizes = WholeNumbers(
         blank(parameters=(parameter("#t", (x.const(4), x.const(2), x.const(9)), ((x.const(0), x.const(2)),)),))
     )
     found = sizes.index(x.param("#t", x.index("i")), ("i",), PLACE)

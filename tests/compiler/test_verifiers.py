@@ -15,7 +15,7 @@ from sysdyn.compiler.model.energies import verify_energies
 from sysdyn.compiler.model.interpret import evaluate
 from sysdyn.compiler.pipeline import compile_network
 from sysdyn.compiler.program import program_text
-from sysdyn.compiler.program.program import Assign, Store
+from sysdyn.compiler.program.program import Assign, StoreInstruction
 from sysdyn.compiler.program.program_text import verify_program
 from sysdyn.dsl.model import expression as x
 from sysdyn.dsl.model.calculus import derivative
@@ -73,7 +73,7 @@ def test_program(model):
     with pytest.raises(AssertionError):
         verify_program(replace(program, slots=()))
     k, entries = next((k, r) for k, r in enumerate(program.routines) if r.part == "dy")
-    without = tuple(s for s in entries.body if not isinstance(s, Store))
+    without = tuple(s for s in entries.body if not isinstance(s, StoreInstruction))
     broken = tuple(replace(r, body=without) if j == k else r for j, r in enumerate(program.routines))
     with pytest.raises(AssertionError):
         verify_program(replace(program, routines=broken))
@@ -164,13 +164,15 @@ def test_energy_model_can_be_written_directly():
     """The constructor is plain: families and terms, no network."""
     from catalogue import PLACE
     from sysdyn.compiler.forms.lagrangian import lagrangian
-    from sysdyn.compiler.model.energies import EnergyModel, Family
+    from sysdyn.compiler.model.energies import EnergyModel, UnknownFamily
     from sysdyn.compiler.model.terms import Term
 
     with x.fresh():
         units = dict.fromkeys("qfpe", "1")
         kinetic = x.mul(x.const(0.5), x.var("a", "f"), x.var("a", "f"))
-        form = lagrangian(EnergyModel((Family("a", (), units, PLACE),), functions={"T*": (Term(kinetic, (), PLACE),)}))
+        form = lagrangian(
+            EnergyModel((UnknownFamily("a", (), units, PLACE),), functions={"T*": (Term(kinetic, (), PLACE),)})
+        )
         (kernel,) = form.block("dynamics").kernels
         assert kernel.rows[0].expression is x.var("a", "f", order=1)
 

@@ -4,7 +4,7 @@ from pathlib import Path
 
 import pytest
 from sysdyn import api, dsl
-from sysdyn.dsl import alone, load
+from sysdyn.dsl import load, unused_components
 from sysdyn.dsl.text.diagnostics import Report, SourceText
 
 LIBRARY = sorted((Path(dsl.__file__).parent / "std").glob("*.sd"))
@@ -49,8 +49,8 @@ USER = "model m {\n  node a: electrical\n  U: used() a -> ground\n  V: effort(e 
 @pytest.mark.one_in(12)
 def test_every_component_of_the_library_is_sound_alone(file):
     document = load.read(file, Report())
-    assert {name: list(own) for name, own in alone.check_unused_components(document)} == {
-        p.name.name: [] for p in alone.unused_components(document.file)
+    assert {name: list(own) for name, own in unused_components.check_unused_components(document)} == {
+        p.name.name: [] for p in unused_components.unused_components(document.file)
     }
 
 
@@ -63,4 +63,8 @@ def test_what_is_wrong_in_parts_is_found(more):
 
 def test_what_a_model_uses_is_judged_there():
     document = load.document(SourceText("m.sd", PARTS + USER), Report())
-    assert [part.name.name for part in alone.unused_components(document.file)] == ["stage", "row", "levelled"]
+    assert [part.name.name for part in unused_components.unused_components(document.file)] == [
+        "stage",
+        "row",
+        "levelled",
+    ]

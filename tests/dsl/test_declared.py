@@ -9,14 +9,14 @@ from sysdyn.dsl.elaborate.files import FileScope
 from sysdyn.dsl.elaborate.instances.casts import cast_of
 from sysdyn.dsl.elaborate.instances.elements import Elements
 from sysdyn.dsl.elaborate.statements.declarations import DECLARED, Declarations
-from sysdyn.dsl.elaborate.statements.parameters import Parameters
+from sysdyn.dsl.elaborate.statements.parameters import ParameterDeclarations
 from sysdyn.dsl.model import dimensions as dim
 from sysdyn.dsl.model import expression as ex
 from sysdyn.dsl.model.evaluation import evaluate
 from sysdyn.dsl.model.values import Values
 from sysdyn.dsl.names.failures import Failed
 from sysdyn.dsl.names.paths import Paths
-from sysdyn.dsl.names.quantities import BRANCH, Quantities, branch_words
+from sysdyn.dsl.names.quantities import BRANCH, QuantityResolver, branch_words
 from sysdyn.dsl.text.diagnostics import Report
 from sysdyn.dsl.text.source import SourceText
 
@@ -44,6 +44,7 @@ def parameter(text, name="a"):
     """A parameter of a model of one: its numbers in SI units, its unit's dimension."""
     elaborator, said = made(f"model m {{ {text} }}")
     assert said == []
+    assert isinstance(elaborator.parameters, ParameterDeclarations)
     found = elaborator.parts.parameters[name]
     return evaluate(found.values, {}), dim.show(found.unit.dimension)
 
@@ -62,7 +63,6 @@ def parameter(text, name="a"):
     ],
 )
 def test_a_parameter_is_held_in_si_units(text, values, unit):
-    assert issubclass(Elaborator, Parameters)
     assert parameter(text) == (pytest.approx(values, rel=1e-15), unit)
 
 
@@ -110,7 +110,7 @@ def test_neither_a_parameter_nor_an_index_is_a_discrete_variable():
 
 def test_an_own_initial_value_is_that_of_every_element():
     elaborator, said = made("model m { param n = 4; coord x[1..n]: translation ~ 2 mm }")
-    assert issubclass(Elaborator, Declarations)
+    assert isinstance(elaborator.declarations, Declarations)
     assert said == []
     (initial,) = elaborator.parts.initials
     assert (initial.fixed, evaluate([initial.value], {})) == (False, [0.002])
@@ -207,8 +207,9 @@ NODES = "node a, b: electrical\n"
     ],
 )
 def test_a_wrong_element_is_told_what_it_wants(text, code, message, at):
-    assert issubclass(Elaborator, Elements)
-    assert (code, message, at) in made(f"model m {{ {NODES}{text} }}")[1]
+    elaborator, said = made(f"model m {{ {NODES}{text} }}")
+    assert isinstance(elaborator.element_builder, Elements)
+    assert (code, message, at) in said
 
 
 def test_a_two_port_is_two_branches_and_their_ratio():
@@ -289,11 +290,11 @@ def read(expression):
     """An expression's node where the cells are in sight (None where it is refused), the elaborator, what it is told."""
     text = CELLS.replace("LINE", f"let y = {expression}")
     elaborator, said = made(text)
-    assert issubclass(Quantities, Paths)
-    assert isinstance(elaborator.resolver, Quantities)
+    assert issubclass(QuantityResolver, Paths)
+    assert isinstance(elaborator.resolver, QuantityResolver)
     elaborator.resolver.report = report = Report()
     node, space, names = None, elaborator.space, elaborator.resolver
-    with suppress(Failed), elaborator.entering(space), names.entering_scope(space.scope, elaborator.source):
+    with suppress(Failed), elaborator.context.entering(space), names.entering_scope(space.scope, elaborator.source):
         node = names.resolve(space.scope.symbols["y"].expression).node
     said += [(d.code, d.message, text[d.place.span.start : d.place.span.end]) for d in report]
     return node, elaborator, said

@@ -34,7 +34,7 @@ def items(text, kind):
 
 
 def table(rows, arguments="x: 1", how="linear"):
-    found, source = items(f"table f({arguments}) -> 1 {how} [{rows}]\n", syntax.Table)
+    found, source = items(f"table f({arguments}) -> 1 {how} [{rows}]\n", syntax.TableDefinition)
     report = Report()
     made = read_table(found[0], [NUMBER] * (arguments.count(",") + 1), NUMBER, source, report)
     return made, [(d.code, d.message) for d in report]
@@ -67,7 +67,7 @@ def test_what_makes_no_table_is_said(rows, arguments, said):
 
 
 def test_values_come_in_si_units():
-    found, source = items("table f(x: mm) -> 1 linear [(0, 5), (250, 7)]\n", syntax.Table)
+    found, source = items("table f(x: mm) -> 1 linear [(0, 5), (250, 7)]\n", syntax.TableDefinition)
     made = read_table(found[0], [MILLI], NUMBER, source, Report())
     assert made.points == ((0.0, 0.25),)
 
@@ -122,7 +122,7 @@ component part {
 
 
 def component():
-    (found,), source = items(COMPONENT, syntax.Component)
+    (found,), source = items(COMPONENT, syntax.ComponentDefinition)
     return found, source
 
 
@@ -136,8 +136,8 @@ def test_what_a_component_asks_of_its_user():
 def test_statements_of_a_kind_are_picked_in_their_order():
     found, _ = component()
     body = Body((statement, ()) for statement in found.body)
-    assert [s.name.name for s, _ in body.statements_of(syntax.Level)] == ["ideal", "real"]
-    assert body.statements_of(syntax.Level) is body.statements_of(syntax.Level)
+    assert [s.name.name for s, _ in body.statements_of(syntax.LevelStatement)] == ["ideal", "real"]
+    assert body.statements_of(syntax.LevelStatement) is body.statements_of(syntax.LevelStatement)
     assert len(list(body)) == len(found.body)
 
 
@@ -151,7 +151,7 @@ def test_names_of_other_levels_are_told_with_the_first_of_them():
 
 def test_levels_show_the_same_from_outside():
     found, source = component()
-    levels = {s.name.name: (s, s.body) for s in found.body if isinstance(s, syntax.Level)}
+    levels = {s.name.name: (s, s.body) for s in found.body if isinstance(s, syntax.LevelStatement)}
     report = Report()
     level_ports("part", levels, source, report)
     assert [(d.code, d.message) for d in report] == [
@@ -186,5 +186,5 @@ def test_a_unit_is_written_with_dots_and_one_stroke_each():
 
 
 def test_a_statement_in_pieces_is_the_statement():
-    (found,), _ = items("model m {\n  param   R=1 ohm\n  node a,b : electrical\n}\n", syntax.Model)
+    (found,), _ = items("model m {\n  param   R=1 ohm\n  node a,b : electrical\n}\n", syntax.ModelDefinition)
     assert ["".join(statement_pieces(s)).strip() for s in found.body] == ["param R = 1 ohm", "node a, b: electrical"]

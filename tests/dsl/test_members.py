@@ -9,16 +9,16 @@ from sysdyn.dsl import load
 from sysdyn.dsl.model import dimensions as dim
 from sysdyn.dsl.model import expression as ex
 from sysdyn.dsl.model.evaluation import evaluate
-from sysdyn.dsl.model.network import Energy
+from sysdyn.dsl.model.network import EnergyTerm
 from sysdyn.dsl.model.units import NONE
 from sysdyn.dsl.model.values import Values
 from sysdyn.dsl.names.failures import Failed
 from sysdyn.dsl.names.members import Members
-from sysdyn.dsl.names.names import STATICS, Names, pick
+from sysdyn.dsl.names.names import STATICS, NameResolver, pick
 from sysdyn.dsl.names.quantities import OF_ELEMENTS
 from sysdyn.dsl.names.reactions import ledger, reaction
 from sysdyn.dsl.names.symbols import Typed, Vector
-from sysdyn.dsl.rules import laws
+from sysdyn.dsl.rules import law_rules
 from sysdyn.dsl.text.diagnostics import Report, SourceText
 
 TEXT = """
@@ -72,7 +72,10 @@ class Read:
         (scene,) = load.document(source, Report()).scenes.values()
         self.context.report = report = Report()
         try:
-            with self.model.entering(self.model.space), self.context.entering_scope(self.model.space.scope, source):
+            with (
+                self.model.context.entering(self.model.space),
+                self.context.entering_scope(self.model.space.scope, source),
+            ):
                 value = self.context.resolve(scene.body[0].items[0].expr)
         except Failed:
             return next((d.code, d.message, d.help) for d in report)
@@ -134,7 +137,7 @@ def read(fresh):
 )
 def test_what_a_name_stands_for(read, text, value, unit):
     assert isinstance(read.context, Members)
-    assert isinstance(read.context, Names)
+    assert isinstance(read.context, NameResolver)
     found = read(text)
     assert found[1] == unit
     assert sorted(found[0].replace(" - ", " + -").split(" + ")) == sorted(value.replace(" - ", " + -").split(" + "))
@@ -245,7 +248,7 @@ def test_the_effort_of_a_constraint_along_a_displacement(read, residual, holonom
     """-(d residual/dq) multiplier, at x = 3, y = 7, multiplier 11."""
     source = SourceText("t.sd", f"scene s of m {{\n  trace {residual}, {target}\n}}\n")
     (scene,) = load.document(source, Report()).scenes.values()
-    with read.model.entering(read.model.space), read.context.entering_scope(read.model.space.scope, source):
+    with read.model.context.entering(read.model.space), read.context.entering_scope(read.model.space.scope, source):
         row, along = (read.context.resolve(item.expr).node for item in scene.body[0].items)
     found = reaction(row, holonomic, along, ex.param("multiplier"))
     at = {"x": 3.0, "y": 7.0}
@@ -289,13 +292,13 @@ def test_notes_on_loops_of_stores_wait_until_laws_are_right():
     text = f"model m {{\n  node a: electrical\n  A: {store}\n  B: {store}\n  R: dissipator(e = 1 ohm*f) a -> ground\n"
     network, _ = of_text(text + "}\n")
     assert told_of(network) == ["N401"]
-    twice = Energy("V", ex.div(ex.power(ex.var("A", "bq"), ex.const(2.0)), ex.const(2.0)), (), network.place)
+    twice = EnergyTerm("V", ex.div(ex.power(ex.var("A", "bq"), ex.const(2.0)), ex.const(2.0)), (), network.place)
     assert told_of(replace(network, energies=(twice,))) == ["E311"]
 
 
 def told_of(network):
     report = Report()
-    laws.run(network, Values(network.parameters, []), report)
+    law_rules.run(network, Values(network.parameters, []), report)
     return [d.code for d in report]
 
 

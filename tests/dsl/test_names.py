@@ -10,7 +10,7 @@ from sysdyn.dsl.model import dimensions as dim
 from sysdyn.dsl.model import expression as ex
 from sysdyn.dsl.model.values import Values
 from sysdyn.dsl.names.arithmetic import Arithmetic
-from sysdyn.dsl.names.calls import Calls, walk
+from sysdyn.dsl.names.calls import CallResolver, walk
 from sysdyn.dsl.names.context import Context
 from sysdyn.dsl.names.failures import Failed
 from sysdyn.dsl.names.laws import law_of, own_variables, ratio_of
@@ -61,7 +61,10 @@ class Read:
         expression, source = self.parsed(text)
         self.context.report = report = Report()
         try:
-            with self.model.entering(self.model.space), self.context.entering_scope(self.model.space.scope, source):
+            with (
+                self.model.context.entering(self.model.space),
+                self.context.entering_scope(self.model.space.scope, source),
+            ):
                 return do(expression)
         except Failed:
             (d,) = report
@@ -169,7 +172,7 @@ def test_a_bare_number_beside_a_quantity_is_written_with_its_unit(read):
     ],
 )
 def test_functions_have_values_and_units(read, text, value, unit):
-    assert isinstance(read.context, Calls)
+    assert isinstance(read.context, CallResolver)
     assert read.value(text) == (pytest.approx(value, rel=1e-15), unit)
 
 

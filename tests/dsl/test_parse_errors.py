@@ -8,7 +8,7 @@ from sysdyn.dsl.parser.grammar import load_tables
 from sysdyn.dsl.parser.parse import parse
 from sysdyn.dsl.text.codes import codes
 from sysdyn.dsl.text.source import SourceText
-from sysdyn.dsl.tree.syntax import Broken
+from sysdyn.dsl.tree.syntax import BrokenStatement
 
 SYNTAX = [f"E{number}" for number in range(107, 119)] + ["E308"]
 
@@ -181,9 +181,14 @@ def test_three_errors_in_one_file_are_all_found():
     assert findings(text) == [("E114", 2, 13), ("E113", 4, 3), ("E113", 6, 13), ("E113", 11, 3)]
     tree = parse(SourceText("t", text))[0]
     model, scene = tree.items
-    assert [type(item).__name__ for item in model.body] == ["Param", "Param", "Broken", "For"]
-    assert [type(item).__name__ for item in model.body[3].body] == ["Broken", "Let"]
-    assert [type(item).__name__ for item in scene.body] == ["Broken", "Trace"]
+    assert [type(item).__name__ for item in model.body] == [
+        "ParamStatement",
+        "ParamStatement",
+        "BrokenStatement",
+        "ForStatement",
+    ]
+    assert [type(item).__name__ for item in model.body[3].body] == ["BrokenStatement", "LetStatement"]
+    assert [type(item).__name__ for item in scene.body] == ["BrokenStatement", "TraceStatement"]
 
 
 def test_a_faulty_head_does_not_hide_its_block():
@@ -198,7 +203,7 @@ def test_a_faulty_head_does_not_hide_its_block():
     ]
     model = parse(SourceText("t", text))[0].items[0]
     assert model.name.name == "a"
-    assert isinstance(model.body[1], Broken)
+    assert isinstance(model.body[1], BrokenStatement)
 
 
 def test_a_broken_statement_tells_its_names():
@@ -217,7 +222,7 @@ def test_unclosed_braces_are_placed_by_indentation():
     assert (found.code, *found.place.start) == ("E112", 2, 17)
     assert found.related[0].place.start == (4, 3)
     tree = parse(SourceText("t", text))[0]
-    assert [type(item).__name__ for item in tree.items] == ["Model", "Scene"]
+    assert [type(item).__name__ for item in tree.items] == ["ModelDefinition", "SceneDefinition"]
 
 
 def test_a_file_that_ends_too_early():
@@ -237,9 +242,9 @@ def test_an_unclosed_bracket_loses_one_statement_only():
     text = "model m {\n  R: resistor(R = 1 ohm\n  C: capacitor(C = 1 uF) a -> b\n  param x = 3kg\n}\n"
     assert findings(text) == [("E112", 2, 14), ("E114", 4, 13)]
     assert [type(item).__name__ for item in parse(SourceText("t", text))[0].items[0].body] == [
-        "Broken",
-        "Instance",
-        "Param",
+        "BrokenStatement",
+        "InstanceStatement",
+        "ParamStatement",
     ]
 
 

@@ -5,7 +5,7 @@ from dataclasses import replace
 import pytest
 from sysdyn.dsl import load
 from sysdyn.dsl.model import expression as ex
-from sysdyn.dsl.model.network import Energy, Loop, Parameter
+from sysdyn.dsl.model.network import EnergyTerm, Loop, Parameter
 from sysdyn.dsl.model.values import Values
 from sysdyn.dsl.rules.counted_twice import counted_twice
 from sysdyn.dsl.rules.dependent_stores import dependent_stores
@@ -66,7 +66,7 @@ def squared(node):
 
 def with_energies(network, **functions):
     place = network.place
-    return replace(network, energies=tuple(Energy(f.replace("_", "*"), e, (), place) for f, e in functions.items()))
+    return replace(network, energies=tuple(EnergyTerm(f.replace("_", "*"), e, (), place) for f, e in functions.items()))
 
 
 def with_law(network, name, law, **more):

@@ -5,7 +5,7 @@ from fractions import Fraction
 import pytest
 from sysdyn.dsl import load
 from sysdyn.dsl.elaborate.instances.unit_variables import _solve_units
-from sysdyn.dsl.elaborate.scenes.listing import Instance, Readable, instances, readable
+from sysdyn.dsl.elaborate.scenes.listing import ListedInstance, Readable, instances, readable
 from sysdyn.dsl.elaborate.scenes.scenes import SceneReader
 from sysdyn.dsl.model import dimensions as dim
 from sysdyn.dsl.model import expression as ex
@@ -188,7 +188,7 @@ def test_names_that_can_be_read_with_their_units():
     report = Report()
     model, _ = load._elaborate(document, document.models["m"], None, report, (), ())
     assert list(report) == []
-    assert instances(model) == (Instance("c", "cell", ("fine", "none"), "fine"),)
+    assert instances(model) == (ListedInstance("c", "cell", ("fine", "none"), "fine"),)
     found = readable(model, Values(model.parts.parameters, []))
     by_name = {r.name: r for r in found}
     assert by_name["c[1..3].X.V"] == Readable("c[1..3].X.V", "c[1..3].X", "element", "J")

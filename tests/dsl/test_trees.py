@@ -39,14 +39,14 @@ def num(text):
 
 
 def unit(text, *factors):
-    return e.Unit(tuple(e.UnitFactor(name, power, sign, AT) for name, power, sign in factors), text, AT)
+    return e.UnitExpression(tuple(e.UnitFactor(name, power, sign, AT) for name, power, sign in factors), text, AT)
 
 
 VOLT, METRE, SECOND = (unit(name, (name, 1, ".")) for name in ("V", "m", "s"))
 
 
 def qty(text, of):
-    return e.Quantity(float(text), text, of, AT)
+    return e.QuantityLiteral(float(text), text, of, AT)
 
 
 def less(left, right):
@@ -60,12 +60,12 @@ EXPRESSIONS = {
     "-a^b": e.Negative(e.Power(n("a"), n("b"), AT), AT),
     "a^b^c": e.Power(n("a"), e.Power(n("b"), n("c"), AT), AT),
     "a^-b": e.Power(n("a"), e.Negative(n("b"), AT), AT),
-    "(a)": e.Group(n("a"), AT),
+    "(a)": e.Parenthesized(n("a"), AT),
     "x[1, i].y'": e.Prime(e.Member(e.Item(n("x"), (num("1"), n("i")), AT), "y", AT), AT),
     "x[1..k]": e.Item(n("x"), (e.Range(num("1"), n("k"), AT),), AT),
-    "f(a, b)": e.Call("f", (e.Arg(None, n("a"), AT), e.Arg(None, n("b"), AT)), AT),
-    "f(x = a)": e.Call("f", (e.Arg("x", n("a"), AT),), AT),
-    "r.on(x)": e.Method(n("r"), "on", (e.Arg(None, n("x"), AT),), AT),
+    "f(a, b)": e.FunctionCall("f", (e.Arg(None, n("a"), AT), e.Arg(None, n("b"), AT)), AT),
+    "f(x = a)": e.FunctionCall("f", (e.Arg("x", n("a"), AT),), AT),
+    "r.on(x)": e.MethodCall(n("r"), "on", (e.Arg(None, n("x"), AT),), AT),
     "prod(j in a..b: c)": e.Reduction("prod", w("j"), n("a"), n("b"), n("c"), AT),
     "a < b": e.Compare("<", n("a"), n("b"), AT),
     "a or b and not c": e.Or((n("a"), e.And((n("b"), e.Not(n("c"), AT)), AT)), AT),
@@ -81,57 +81,59 @@ EXPRESSIONS = {
 
 @pytest.mark.parametrize(("text", "tree"), EXPRESSIONS.items(), ids=EXPRESSIONS)
 def test_an_expression(text, tree):
-    assert first_difference(read(f"const k = {text}"), (i.Const(w("k"), tree, AT, None),)) is None
+    assert first_difference(read(f"const k = {text}"), (i.ConstDefinition(w("k"), tree, AT, None),)) is None
 
 
-EQUAL, GUESS = s.Initial("fixed", n("a"), AT), s.Initial("guess", n("a"), AT)
+EQUAL, GUESS = s.InitialValue("fixed", n("a"), AT), s.InitialValue("guess", n("a"), AT)
 STATEMENTS = {
-    "param p[3]: m = a": s.Param(d("p", num("3")), METRE, n("a"), AT, None),
-    "param p": s.Param(d("p"), None, None, AT, None),
-    "node u, v[1..k]: electrical ~ a": s.Node(
+    "param p[3]: m = a": s.ParamStatement(d("p", num("3")), METRE, n("a"), AT, None),
+    "param p": s.ParamStatement(d("p"), None, None, AT, None),
+    "node u, v[1..k]: electrical ~ a": s.NodeStatement(
         (d("u"), d("v", e.Range(num("1"), n("k"), AT))), w("electrical"), GUESS, AT, None
     ),
-    "port u, v: electrical": s.Port((d("u"), d("v")), w("electrical"), AT, None),
-    "branch: electrical": s.Branch((), w("electrical"), AT, None),
-    "branch u: electrical": s.Branch((d("u"),), w("electrical"), AT, None),
-    "input u: V = a": s.Input(d("u"), VOLT, n("a"), AT, None),
-    "output y = a": s.Output(d("y"), n("a"), AT, None),
-    "quasi w: m/s = a": s.Quasi(d("w"), unit("m/s", ("m", 1, "."), ("s", 1, "/")), n("a"), AT, None),
-    "coord x, y: translation = a": s.Coord("coord", (d("x"), d("y")), w("translation"), None, EQUAL, AT, None),
-    "coord x: translation tangible": s.Coord("coord", (d("x"),), w("translation"), True, None, AT, None),
-    "coord x: translation intangible ~ a": s.Coord("coord", (d("x"),), w("translation"), False, GUESS, AT, None),
-    "implicit e1: V ~ a": s.Implicit((d("e1"),), VOLT, GUESS, AT, None),
-    "state z: m = a": s.State(d("z"), METRE, n("a"), AT, None),
-    "dynamic z = a": s.Dynamic(n("z"), n("a"), AT, None),
-    "let y = a": s.Let(d("y"), n("a"), AT, None),
-    "energy T* own = a": s.Energy("T*", w("own"), n("a"), AT, None),
-    "energy V = a": s.Energy("V", None, n("a"), AT, None),
-    "content D = a": s.Content("D", None, n("a"), AT, None),
-    "work a on b": s.Work(n("a"), n("b"), AT, None),
-    "phi rod: a = b": s.Constraint("phi", d("rod"), n("a"), "=", n("b"), (), AT, None),
-    "phi stop: a >= b while c restitution k": s.Constraint(
+    "port u, v: electrical": s.PortStatement((d("u"), d("v")), w("electrical"), AT, None),
+    "branch: electrical": s.BranchStatement((), w("electrical"), AT, None),
+    "branch u: electrical": s.BranchStatement((d("u"),), w("electrical"), AT, None),
+    "input u: V = a": s.InputStatement(d("u"), VOLT, n("a"), AT, None),
+    "output y = a": s.OutputStatement(d("y"), n("a"), AT, None),
+    "quasi w: m/s = a": s.QuasiStatement(d("w"), unit("m/s", ("m", 1, "."), ("s", 1, "/")), n("a"), AT, None),
+    "coord x, y: translation = a": s.CoordStatement("coord", (d("x"), d("y")), w("translation"), None, EQUAL, AT, None),
+    "coord x: translation tangible": s.CoordStatement("coord", (d("x"),), w("translation"), True, None, AT, None),
+    "coord x: translation intangible ~ a": s.CoordStatement(
+        "coord", (d("x"),), w("translation"), False, GUESS, AT, None
+    ),
+    "implicit e1: V ~ a": s.ImplicitStatement((d("e1"),), VOLT, GUESS, AT, None),
+    "state z: m = a": s.StateStatement(d("z"), METRE, n("a"), AT, None),
+    "dynamic z = a": s.DynamicStatement(n("z"), n("a"), AT, None),
+    "let y = a": s.LetStatement(d("y"), n("a"), AT, None),
+    "energy T* own = a": s.EnergyStatement("T*", w("own"), n("a"), AT, None),
+    "energy V = a": s.EnergyStatement("V", None, n("a"), AT, None),
+    "content D = a": s.ContentStatement("D", None, n("a"), AT, None),
+    "work a on b": s.WorkStatement(n("a"), n("b"), AT, None),
+    "phi rod: a = b": s.ConstraintStatement("phi", d("rod"), n("a"), "=", n("b"), (), AT, None),
+    "phi stop: a >= b while c restitution k": s.ConstraintStatement(
         "phi", d("stop"), n("a"), ">=", n("b"),
         (s.Guard("while", n("c"), AT), s.Guard("restitution", n("k"), AT)), AT, None,
     ),
-    "init x.q = a": s.Init(e.Member(n("x"), "q", AT), EQUAL, AT, None),
-    "init x.q ~ a": s.Init(e.Member(n("x"), "q", AT), GUESS, AT, None),
-    "when a { z := b }": s.When(n("a"), (s.Action(n("z"), n("b"), AT),), AT, None),
-    "every a { z := b }": s.Every(n("a"), (s.Action(n("z"), n("b"), AT),), AT, None),
-    "for j in a..b { let y[j] = c }": s.For(
-        w("j"), n("a"), n("b"), (s.Let(d("y", n("j")), n("c"), AT, None),), AT, None
+    "init x.q = a": s.InitStatement(e.Member(n("x"), "q", AT), EQUAL, AT, None),
+    "init x.q ~ a": s.InitStatement(e.Member(n("x"), "q", AT), GUESS, AT, None),
+    "when a { z := b }": s.WhenStatement(n("a"), (s.ActionStatement(n("z"), n("b"), AT),), AT, None),
+    "every a { z := b }": s.EveryStatement(n("a"), (s.ActionStatement(n("z"), n("b"), AT),), AT, None),
+    "for j in a..b { let y[j] = c }": s.ForStatement(
+        w("j"), n("a"), n("b"), (s.LetStatement(d("y", n("j")), n("c"), AT, None),), AT, None
     ),
-    "require a > b": s.Require(e.Compare(">", n("a"), n("b"), AT), AT, None),
-    "lossless": s.Lossless(AT, None),
-    "R: resistor(a) u -> v": s.Instance(
+    "require a > b": s.RequireStatement(e.Compare(">", n("a"), n("b"), AT), AT, None),
+    "lossless": s.LosslessStatement(AT, None),
+    "R: resistor(a) u -> v": s.InstanceStatement(
         d("R"), e.Dotted(("resistor",), AT), (e.Arg(None, n("a"), AT),), (s.Across(n("u"), n("v"), AT),), AT, None
     ),
-    "R: lib.pump(a) u": s.Instance(
+    "R: lib.pump(a) u": s.InstanceStatement(
         d("R"), e.Dotted(("lib", "pump"), AT), (e.Arg(None, n("a"), AT),), (s.Single(n("u"), AT),), AT, None
     ),
-    "W: flow(a) on b": s.Instance(
+    "W: flow(a) on b": s.InstanceStatement(
         d("W"), e.Dotted(("flow",), AT), (e.Arg(None, n("a"), AT),), (s.On(n("b"), AT),), AT, None
     ),
-    "M: motor(a) p = u, m = v -> ground": s.Instance(
+    "M: motor(a) p = u, m = v -> ground": s.InstanceStatement(
         d("M"),
         e.Dotted(("motor",), AT),
         (e.Arg(None, n("a"), AT),),
@@ -144,32 +146,34 @@ STATEMENTS = {
 
 @pytest.mark.parametrize(("text", "tree"), STATEMENTS.items(), ids=STATEMENTS)
 def test_a_statement_of_a_model(text, tree):
-    assert first_difference(read(f"model m {{\n  {text}\n}}\n"), (i.Model(w("m"), (tree,), AT, None),)) is None
+    assert (
+        first_difference(read(f"model m {{\n  {text}\n}}\n"), (i.ModelDefinition(w("m"), (tree,), AT, None),)) is None
+    )
 
 
 SCENES = {
-    "time a to b": c.Time(n("a"), n("b"), AT, None),
-    "set p = a": c.Set(n("p"), n("a"), AT, None),
-    "level M.La = fine": c.SceneLevel(e.Member(n("M"), "La", AT), w("fine"), AT, None),
-    "trace a, b in mm as y every c": c.Trace(
+    "time a to b": c.TimeStatement(n("a"), n("b"), AT, None),
+    "set p = a": c.SetStatement(n("p"), n("a"), AT, None),
+    "level M.La = fine": c.SceneLevelStatement(e.Member(n("M"), "La", AT), w("fine"), AT, None),
+    "trace a, b in mm as y every c": c.TraceStatement(
         (c.TraceItem(n("a"), None, None, AT), c.TraceItem(n("b"), unit("mm", ("mm", 1, ".")), w("y"), AT)),
         n("c"), AT, None,
     ),
-    "accuracy a on b, k": c.Accuracy(n("a"), (n("b"), n("k")), False, AT, None),
-    "accuracy a": c.Accuracy(n("a"), (), False, AT, None),
-    "formulation kane": c.Formulation(w("kane"), AT, None),
-    "solver radau": c.Solver(w("radau"), None, AT, None),
-    "redundancy drop": c.Redundancy(w("drop"), AT, None),
-    "limit steps a": c.Limit(w("steps"), n("a"), AT, None),
-    "expect always: a < b": s.Expect("always", None, n("a"), "<", n("b"), None, AT, None),
-    "expect at k: a == b within c": s.Expect("at", n("k"), n("a"), "==", n("b"), n("c"), AT, None),
-    'expect golden "r.h5" within a': s.Golden("r.h5", n("a"), AT, None),
+    "accuracy a on b, k": c.AccuracyStatement(n("a"), (n("b"), n("k")), False, AT, None),
+    "accuracy a": c.AccuracyStatement(n("a"), (), False, AT, None),
+    "formulation kane": c.FormulationStatement(w("kane"), AT, None),
+    "solver radau": c.SolverStatement(w("radau"), None, AT, None),
+    "redundancy drop": c.RedundancyStatement(w("drop"), AT, None),
+    "limit steps a": c.LimitStatement(w("steps"), n("a"), AT, None),
+    "expect always: a < b": s.ExpectStatement("always", None, n("a"), "<", n("b"), None, AT, None),
+    "expect at k: a == b within c": s.ExpectStatement("at", n("k"), n("a"), "==", n("b"), n("c"), AT, None),
+    'expect golden "r.h5" within a': s.GoldenStatement("r.h5", n("a"), AT, None),
 }  # fmt: skip
 
 
 @pytest.mark.parametrize(("text", "tree"), SCENES.items(), ids=SCENES)
 def test_a_statement_of_a_scene(text, tree):
-    scene = i.Scene(w("go"), e.Dotted(("m",), AT), (tree,), AT, None)
+    scene = i.SceneDefinition(w("go"), e.Dotted(("m",), AT), (tree,), AT, None)
     assert first_difference(read(f"scene go of m {{\n  {text}\n}}\n"), (scene,)) is None
 
 
@@ -177,22 +181,24 @@ ITEMS = {
     "from std.electrical import resistor, capacitor": i.Import(
         e.Dotted(("std", "electrical"), AT), (w("resistor"), w("capacitor")), AT, None
     ),
-    "bundle pair { plus, minus: electrical }": i.Bundle(
+    "bundle pair { plus, minus: electrical }": i.BundleDefinition(
         w("pair"), (i.BundleMember((w("plus"), w("minus")), w("electrical"), AT),), AT, None
     ),
     "unit mil = a": i.UnitAlias(w("mil"), n("a"), AT, None),
     "unit person base": i.UnitBase(w("person"), AT, None),
-    "fn f(x: m, y[3]: s) -> V = a": i.Function(
-        w("f"), (i.Parameter("x", None, METRE, AT), i.Parameter("y", num("3"), SECOND, AT)), VOLT, n("a"), AT, None
+    "fn f(x: m, y[3]: s) -> V = a": i.FunctionDefinition(
+        w("f"),
+        (i.FormalParameter("x", None, METRE, AT), i.FormalParameter("y", num("3"), SECOND, AT)),
+        VOLT, n("a"), AT, None,
     ),
-    "table f(x: m) -> V linear stop [(1, 2), (3, -4)]": i.Table(
-        w("f"), (i.Parameter("x", None, METRE, AT),), VOLT, "linear", "stop",
-        (i.Row((num("1"), num("2")), AT), i.Row((num("3"), num("-4")), AT)), None, AT, None,
+    "table f(x: m) -> V linear stop [(1, 2), (3, -4)]": i.TableDefinition(
+        w("f"), (i.FormalParameter("x", None, METRE, AT),), VOLT, "linear", "stop",
+        (i.TableRow((num("1"), num("2")), AT), i.TableRow((num("3"), num("-4")), AT)), None, AT, None,
     ),
-    'table f(x: m) -> V cubic file "f.csv"': i.Table(
-        w("f"), (i.Parameter("x", None, METRE, AT),), VOLT, "cubic", None, None, "f.csv", AT, None
+    'table f(x: m) -> V cubic file "f.csv"': i.TableDefinition(
+        w("f"), (i.FormalParameter("x", None, METRE, AT),), VOLT, "cubic", None, None, "f.csv", AT, None
     ),
-    "component c { }": i.Component(w("c"), (), AT, None),
+    "component c { }": i.ComponentDefinition(w("c"), (), AT, None),
 }  # fmt: skip
 
 
@@ -254,10 +260,10 @@ def test_a_unit_has_no_number_but_one():
 @pytest.mark.parametrize(
     ("build", "letter", "kind", "help_"),
     [
-        (build_statements.energy, "T*", s.Energy, None),
-        (build_statements.content, "G", s.Content, None),
-        (build_statements.energy, "D", s.Content, "content D = ..."),
-        (build_statements.content, "V", s.Energy, "energy V = ..."),
+        (build_statements.energy, "T*", s.EnergyStatement, None),
+        (build_statements.content, "G", s.ContentStatement, None),
+        (build_statements.energy, "D", s.ContentStatement, "content D = ..."),
+        (build_statements.content, "V", s.EnergyStatement, "energy V = ..."),
     ],
 )
 def test_a_state_function_is_what_its_letter_says(build, letter, kind, help_):
@@ -268,7 +274,7 @@ def test_a_state_function_is_what_its_letter_says(build, letter, kind, help_):
 
 def test_nodes_have_a_common_effort_or_flow():
     made, found = told(build_statements.domain_node, ["momentum"])
-    assert isinstance(made, s.Broken)
+    assert isinstance(made, s.BrokenStatement)
     assert [f[1] for f in found] == ["nodes have a common effort or a common flow, not a common momentum"]
     assert told(build_statements.domain_node, ["flow"])[0].common == "flow"
 

@@ -9,7 +9,7 @@ from sysdyn.dsl.model import collecting
 from sysdyn.dsl.model.units import Unit, find_unit
 from sysdyn.dsl.names import habits
 from sysdyn.dsl.names.fitting import fitting_unit, in_unit
-from sysdyn.dsl.names.symbols import Family, ParameterSymbol, Scope, nearest
+from sysdyn.dsl.names.symbols import NameFamily, ParameterSymbol, Scope, nearest
 from sysdyn.dsl.names.unit_reading import read_unit
 from sysdyn.dsl.parser.foreign import explain_suffix, find_slip, spice
 from sysdyn.dsl.text.codes import codes
@@ -130,7 +130,7 @@ def test_the_nearest_name_differs_in_case_before_it_differs_in_letters():
 
 def parameter(name, dimension):
     place = SourceText("m.sd", name).place(0, 1)
-    return ParameterSymbol(name, Family(name, (), (), ()), dimension, truth=False, place=place)
+    return ParameterSymbol(name, NameFamily(name, (), (), ()), dimension, truth=False, place=place)
 
 
 def named(name):

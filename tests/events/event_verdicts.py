@@ -9,7 +9,7 @@ import time
 from contextlib import contextmanager
 from dataclasses import dataclass
 
-from sysdyn.cli.run.request.asked import Request
+from sysdyn.cli.run.request.run_request import RunRequest
 from sysdyn.cli.run.running import run
 from sysdyn.dsl.text.diagnostics import ModelError, Report
 
@@ -61,7 +61,7 @@ def judge(folder, drawn, **options):
 
     try:
         with _limited(LONGEST):
-            found = run(Request(str(path), scene="s", output=str(folder / "trace.h5"), **options), report)
+            found = run(RunRequest(str(path), scene="s", output=str(folder / "trace.h5"), **options), report)
     except _HungError:
         return verdict("hung", f"not ended after {LONGEST} s")
     except ModelError as error:

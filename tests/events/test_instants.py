@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from sysdyn import api
 from sysdyn.cli.run import running
-from sysdyn.cli.run.request.asked import Request
+from sysdyn.cli.run.request.run_request import RunRequest
 from sysdyn.dsl.text.diagnostics import Report
 
 AGAIN = """model again {
@@ -89,7 +89,7 @@ def refused(tmp_path, text, **options):
     """What is said of a run that stops, or of a text that does not start."""
     (tmp_path / "m.sd").write_text(text)
     report = Report()
-    ran = running.run(Request(str(tmp_path / "m.sd"), output=str(tmp_path / "out.h5"), **options), report)
+    ran = running.run(RunRequest(str(tmp_path / "m.sd"), output=str(tmp_path / "out.h5"), **options), report)
     assert ran is None or ran.exit == 3
     return " ".join(f"{d.code} {d.message}" for d in report)
 

@@ -86,7 +86,7 @@ def api_scenes(model):
 
 def formed_of(model, index, backend, scene, settings):
     """The runtime's own system of a model's form."""
-    from sysdyn.cli.export.layout import choose
+    from sysdyn.cli.export.tabulation import choose
     from sysdyn.cli.run.prepare import prepare
     from sysdyn.cli.run.request import targets
     from sysdyn.cli.run.start.starting import start

@@ -4,7 +4,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-from sysdyn.cli.run.request.asked import Request
+from sysdyn.cli.run.request.run_request import RunRequest
 from sysdyn.cli.run.running import run
 from sysdyn.dsl.text.diagnostics import Report
 
@@ -33,7 +33,7 @@ def ran(folder, text, **options):
     if path.parent == folder:
         path.write_text(text, encoding="utf-8")
     report = Report()
-    found = run(Request(str(path), output=str(folder / "trace.h5"), **options), report)
+    found = run(RunRequest(str(path), output=str(folder / "trace.h5"), **options), report)
     if found is None:
         return Ran(" ".join(d.code for d in report.diagnostics if d.severity == "error") or "no run", False)
     outcome = found.outcome

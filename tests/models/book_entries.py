@@ -5,8 +5,8 @@ from dataclasses import dataclass
 import numpy as np
 from reduced import ROOT
 from reference_values import load
-from sysdyn.cli.analysis.asked import compile_target, model_at_start
-from sysdyn.cli.run.request.asked import Request
+from sysdyn.cli.analysis.operating_point import compile_target, model_at_start
+from sysdyn.cli.run.request.run_request import RunRequest
 from sysdyn.compiler.binding.oracle import Oracle
 from sysdyn.dsl.text.diagnostics import Report
 
@@ -57,9 +57,9 @@ def begin(entry):
     """The compiled text and its state at the start."""
     report = Report()
     path = str(BOOK / f"{entry.file}.sd")
-    request = Request(path, formulation=entry.formulation, backend="numpy", scene="reference")
+    request = RunRequest(path, formulation=entry.formulation, backend="numpy", scene="reference")
     if entry.key == "redundant_pendulum":
-        request = Request(path, formulation=entry.formulation, backend="numpy", redundancy="minimum_norm")
+        request = RunRequest(path, formulation=entry.formulation, backend="numpy", redundancy="minimum_norm")
     made = compile_target(request, report)
     assert made is not None, [f"{d.code} {d.message}" for d in report]
     found = model_at_start(*made, request, report)

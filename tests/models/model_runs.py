@@ -1,6 +1,6 @@
 """Texts and models under a scene, run to their traces."""
 
-from sysdyn.cli.run.request.asked import Request
+from sysdyn.cli.run.request.run_request import RunRequest
 from sysdyn.cli.run.running import run
 from sysdyn.dsl.text.diagnostics import Report
 from sysdyn.runtime.trace.trace import Trace
@@ -16,7 +16,7 @@ def attempt(tmp_path, text, **options):
         path.write_text(text)
     report = Report()
     options = {"max_wall": "60", "output": str(tmp_path / "trace.h5"), **options}
-    return run(Request(str(path), **options), report), report
+    return run(RunRequest(str(path), **options), report), report
 
 
 def trace_of(tmp_path, text, **options):

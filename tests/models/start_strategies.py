@@ -11,7 +11,7 @@ from collections import Counter
 from reduced import ROOT
 from sysdyn.cli.options import EVERY
 from sysdyn.cli.run.request import targets
-from sysdyn.cli.run.request.asked import Request
+from sysdyn.cli.run.request.run_request import RunRequest
 from sysdyn.cli.run.running import ready
 from sysdyn.cli.run.start.starting import start
 from sysdyn.dsl import load
@@ -47,7 +47,7 @@ def _started(name, document, scene, formulation, report=None):
     report = Report() if report is None else report
     with ex.fresh():
         target = targets.one(document, name, None, scene, report)
-        prepared = target and ready(Request(name, formulation=formulation, backend="numpy"), target, report)
+        prepared = target and ready(RunRequest(name, formulation=formulation, backend="numpy"), target, report)
         if prepared is None:
             return None, None
         begin = prepared.network.scene and prepared.network.scene.start

@@ -10,8 +10,8 @@ from book_entries import begin, filled, solution, state
 from capabilities import RC, REFERENCES, counts, entries, meets
 from model_runs import trace_of
 from reduced import ROOT
-from sysdyn.cli.analysis.asked import compile_target
-from sysdyn.cli.run.request.asked import Request
+from sysdyn.cli.analysis.operating_point import compile_target
+from sysdyn.cli.run.request.run_request import RunRequest
 from sysdyn.compiler.binding.oracle import Oracle
 from sysdyn.compiler.model.mirror import letter
 from sysdyn.dsl.model import expression as ex
@@ -40,7 +40,7 @@ def test_01_unified_variables():
                 one, other = (unit.dimension for unit in pair)
                 assert multiply(one, other) == product
     assert len(seen) == 4  # translation, rotation, electrical, fluid
-    warm = compile_target(Request(str(ROOT / "models" / "seed" / "thermal_two_node.sd"), backend="numpy"), Report())
+    warm = compile_target(RunRequest(str(ROOT / "models" / "seed" / "thermal_two_node.sd"), backend="numpy"), Report())
     assert all(multiply(c.effort.dimension, c.flow.dimension) != POWER for c in warm[1].compiled.network.coordinates)
 
 
@@ -187,7 +187,7 @@ def test_17_flow_constraints():
 def test_18_tangible_displacements():
     """A flow constraint that moves a charge is integrated with its initial content, a constant of the form."""
     with ex.fresh():
-        _, prepared = compile_target(Request(str(ROOT / "models/seed/lead_filter.sd"), backend="numpy"), Report())
+        _, prepared = compile_target(RunRequest(str(ROOT / "models/seed/lead_filter.sd"), backend="numpy"), Report())
         assert len(prepared.compiled.form.offsets) == 1
         assert any(d.code == "N501" for d in prepared.compiled.notes)
 

@@ -2,10 +2,10 @@
 
 import numpy as np
 import pytest
-from sysdyn.cli.run.many.loaded import Loaded
-from sysdyn.cli.run.request.asked import Request
-from sysdyn.cli.sweep.kept import Block
+from sysdyn.cli.run.many.reusable_model import Loaded
+from sysdyn.cli.run.request.run_request import RunRequest
 from sysdyn.cli.sweep.one_run import Runner
+from sysdyn.cli.sweep.run_records import KeptRuns
 
 OSCILLATOR = """\
 model m {
@@ -49,11 +49,11 @@ def _both(folder, text, name, values, **asked):
     file = folder / "m.sd"
     file.write_text(text)
     tasks = [(k, {name: value}) for k, value in enumerate(values)]
-    loaded = Loaded(Request(str(file), **asked))
-    found, left = Runner(Request(str(file), **asked), loaded=loaded).chunk(tasks)
-    alone = Runner(Request(str(file), **asked), core=False, loaded=loaded)
+    loaded = Loaded(RunRequest(str(file), **asked))
+    found, left = Runner(RunRequest(str(file), **asked), loaded=loaded).chunk(tasks)
+    alone = Runner(RunRequest(str(file), **asked), core=False, loaded=loaded)
     single = [alone(*task) for task in tasks]
-    inside = [block.one(k) for block in found if isinstance(block, Block) for k in range(len(block.runs))]
+    inside = [block.one(k) for block in found if isinstance(block, KeptRuns) for k in range(len(block.runs))]
     return inside, single, left
 
 
@@ -105,9 +105,9 @@ def test_what_nobody_asks_is_not_sought(tmp_path):
     """End values alone: no look, the same steps."""
     file = tmp_path / "m.sd"
     file.write_text(OSCILLATOR.replace("EVERY", "every 1 s"))
-    loaded = Loaded(Request(str(file)))
+    loaded = Loaded(RunRequest(str(file)))
     end, traces = (
-        Runner(Request(str(file)), keep, core=False, loaded=loaded)(0, {"k": 5.0}) for keep in ("end", "traces")
+        Runner(RunRequest(str(file)), keep, core=False, loaded=loaded)(0, {"k": 5.0}) for keep in ("end", "traces")
     )
     assert end.least is None
     assert end.most is None

@@ -3,7 +3,7 @@
 from pathlib import Path
 
 import pytest
-from sysdyn.cli.run.request.asked import Request
+from sysdyn.cli.run.request.run_request import RunRequest
 from sysdyn.cli.run.running import run
 from sysdyn.dsl.text.diagnostics import Report
 from sysdyn.runtime.trace.trace import Trace
@@ -52,7 +52,7 @@ def first(tmp_path, text, formulation):
     path = tmp_path / "model.sd"
     path.write_text(text)
     report = Report()
-    ran = run(Request(str(path), formulation=formulation, output=str(tmp_path / "trace.h5")), report)
+    ran = run(RunRequest(str(path), formulation=formulation, output=str(tmp_path / "trace.h5")), report)
     assert ran is not None, [f"{d.code} {d.message}" for d in report]
     trace = Trace.open(tmp_path / "trace.h5")
     return {name: float(trace[name].values[0]) for name in trace.names}
@@ -80,7 +80,7 @@ def test_a_guess_on_a_singular_point_starts_alike_in_both_formulations(tmp_path)
     path = ROOT / "tests" / "mutation" / "held.sd"
     for formulation in ("lagrangian", "hamiltonian"):
         report = Report()
-        request = Request(str(path), formulation=formulation, until="0.1", output=str(tmp_path / "t.h5"))
+        request = RunRequest(str(path), formulation=formulation, until="0.1", output=str(tmp_path / "t.h5"))
         ran = run(request, report)
         assert ran is not None
         trace = Trace.open(tmp_path / "t.h5")

@@ -5,7 +5,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from sysdyn.api import simulate
-from sysdyn.cli.run.request.asked import Request
+from sysdyn.cli.run.request.run_request import RunRequest
 from sysdyn.cli.run.running import run
 from sysdyn.dsl.text.diagnostics import Report
 from sysdyn.runtime.accuracy import runs
@@ -24,7 +24,7 @@ def watched(monkeypatch, folder, name, **options):
 
     monkeypatch.setattr(runs, "Integration", Watched)
     report = Report()
-    found = run(Request(str(MODELS / f"{name}.sd"), output=str(folder / "trace.h5"), **options), report)
+    found = run(RunRequest(str(MODELS / f"{name}.sd"), output=str(folder / "trace.h5"), **options), report)
     assert found is not None, [d.message for d in report.diagnostics]
     last, first = seen[-1]
     met, system = last.last()[2], last.system

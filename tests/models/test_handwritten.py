@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 from handwritten import chain, ladder, lattice, mesh, mixed, power_grid, stages, woven
 from sysdyn.api import simulate
-from sysdyn.cli.run.generated import module_of
+from sysdyn.cli.run.numpy_module import module_of
 from sysdyn.cli.run.prepare import Prepared
-from sysdyn.compiler.network import gathered as gathered_
-from sysdyn.compiler.network.gathered import gather_families
+from sysdyn.compiler.network import alike_elements as gathered_
+from sysdyn.compiler.network.alike_elements import gather_families
 from sysdyn.compiler.pipeline import compile_network
 from sysdyn.dsl import load
 from sysdyn.dsl.model.expression import fresh

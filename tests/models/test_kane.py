@@ -7,7 +7,7 @@ from reference_values import load
 from scipy.integrate import solve_ivp
 from sysdyn.api import simulate
 from sysdyn.cli.main import run as main
-from sysdyn.cli.run.request.asked import Request
+from sysdyn.cli.run.request.run_request import RunRequest
 from sysdyn.cli.run.running import run
 from sysdyn.dsl.text.diagnostics import Report
 from sysdyn.runtime.trace.trace import Trace
@@ -79,7 +79,7 @@ scene s of rod {
 def simulated(tmp_path, path, formulation, **options):
     report = Report()
     output = tmp_path / f"{formulation}.h5"
-    ran = run(Request(str(path), formulation=formulation, output=str(output), **options), report)
+    ran = run(RunRequest(str(path), formulation=formulation, output=str(output), **options), report)
     assert ran is not None, [f"{d.code} {d.message}" for d in report]
     assert ran.exit == 0
     return ran, Trace.open(output)
@@ -203,7 +203,7 @@ def test_what_follows_from_others_is_refused_in_its_own_name(tmp_path, formulati
 """)
     asked = {"formulation": formulation, "until": "1", "redundancy": "drop", "output": str(tmp_path / "t.h5")}
     report = Report()
-    assert run(Request(str(path), **asked), report) is None
+    assert run(RunRequest(str(path), **asked), report) is None
     (found,) = [d for d in report if d.severity == "error"]
     assert found.code == "E607"
     assert "follows from the others" in found.message
@@ -276,7 +276,7 @@ def test_without_flow_constraint_and_quasi_velocity_the_flows_are_the_speeds(cap
         texts.append(capsys.readouterr().out)
     assert texts[0] == texts[1]
     report = Report()
-    request = Request(path, scene="reference", formulation="kane", own=True, until="0.01")
+    request = RunRequest(path, scene="reference", formulation="kane", own=True, until="0.01")
     assert run(request, report) is None
     assert [d.code for d in report if d.severity == "error"] == ["E607"]
 

@@ -3,12 +3,12 @@
 import numpy as np
 import pytest
 from start_strategies import prepared_start
-from sysdyn.cli.analysis.linear import linearise
+from sysdyn.cli.analysis.linearisation import linearise
 from sysdyn.cli.analysis.states import state_of
 from sysdyn.cli.export.starts import start_tables
 from sysdyn.cli.export.tables import assembly_tables
 from sysdyn.cli.run.events import plan
-from sysdyn.cli.run.request.asked import Request
+from sysdyn.cli.run.request.run_request import RunRequest
 from sysdyn.cli.run.verdict.culprit import undefined_at_start
 from sysdyn.dsl.text.diagnostics import Report
 from sysdyn.runtime.integrate.rows.bare import by_sums, shows
@@ -72,7 +72,7 @@ def at(system, y, name):
 
 def test_a_mass_hangs_where_its_spring_bears_it(tmp_path):
     (tmp_path / "m.sd").write_text(HANGING)
-    found, why = state_of(Request(str(tmp_path / "m.sd"), backend="numpy"), None, (), Report(), rest=True)
+    found, why = state_of(RunRequest(str(tmp_path / "m.sd"), backend="numpy"), None, (), Report(), rest=True)
     assert why is None
     assert at(found.system, found.state.y, "x") == pytest.approx(-1.3 * 9.80665 / 52.0, rel=1e-12)
     linear = linearise(found, ())

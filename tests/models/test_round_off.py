@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from model_runs import trace_of
 from sysdyn.cli import main
-from sysdyn.cli.run.request.asked import Request
+from sysdyn.cli.run.request.run_request import RunRequest
 from sysdyn.cli.run.running import run
 from sysdyn.dsl.text.diagnostics import Report
 from sysdyn.runtime.start import start
@@ -31,7 +31,7 @@ def test_last_digits_do_not_decide(tmp_path, monkeypatch, model, formulation, se
     monkeypatch.setattr(start, "solve", shaken)
     report = Report()
     settings = tuple((name, repr(value)) for name, value in settings_of(model, seed % 3).items())
-    request = Request(
+    request = RunRequest(
         str(SEED / f"{model}.sd"),
         scene="reference",
         formulation=formulation,

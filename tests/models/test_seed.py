@@ -12,7 +12,7 @@ import pytest
 from changed import CHANGED, EXTREME, STIFF
 from reduced import ROOT, solution
 from reference_values import load
-from sysdyn.cli.run.request.asked import Request
+from sysdyn.cli.run.request.run_request import RunRequest
 from sysdyn.cli.run.running import run
 from sysdyn.dsl.text.diagnostics import Report
 from sysdyn.runtime.trace.trace import Trace
@@ -59,7 +59,7 @@ CASES = [(model, formulation) for model in MODELS for formulation in formulation
 def simulated(tmp_path, model, *, formulation, times, backend="c", settings=(), accuracy=None):
     """Traced values at the instants asked for."""
     report = Report()
-    request = Request(
+    request = RunRequest(
         str(SEED / f"{model}.sd"),
         scene="reference",
         formulation=formulation,

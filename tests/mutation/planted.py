@@ -22,7 +22,7 @@ import numpy as np
 from sysdyn.cli.run import module_check, running
 from sysdyn.cli.run.prepare import Prepared
 from sysdyn.cli.run.request import targets
-from sysdyn.cli.run.request.asked import Request, options_of
+from sysdyn.cli.run.request.run_request import RunRequest, options_of
 from sysdyn.cli.run.request.targets import Target
 from sysdyn.cli.run.running import integrate, ready
 from sysdyn.compiler.program import build
@@ -109,7 +109,7 @@ class Bench:
 
     def __init__(self, path: Path, formulation: str, folder: Path) -> None:
         self.path, self.folder = path, folder
-        request = Request(str(path), scene="reference", formulation=formulation, output=str(folder / "t.h5"))
+        request = RunRequest(str(path), scene="reference", formulation=formulation, output=str(folder / "t.h5"))
         report = Report()
         document = targets.read(str(path), report)
         target = targets.one(document, str(path), None, "reference", report)

@@ -48,7 +48,7 @@ LOWERING = (
     "model/mirror.py", "network/reflection.py", "network/positions.py", "network/quadratures.py",
     "network/primal/balances.py", "network/primal/choices.py", "network/primal/laws.py", "network/primal/series.py",
     "network/primal/potentials.py", "network/primal/reading.py", "network/primal/contents.py",
-    "network/primal/overlaps.py", "network/primal/unspecified.py",
+    "network/primal/overlaps.py", "network/primal/store_guesses.py",
 )  # fmt: skip
 SEEDS = (
     "dc_motor", "knife_edge", "pendulum", "lead_filter", "two_link_arm", "bead_rod", "electrical_transformer",
@@ -83,7 +83,7 @@ EQUIVALENT = (
     ("network/primal/choices.py", "_said", "", _TEXT),
     ("network/primal/laws.py", "_implicit", 'b.side == "p"', _TEXT),
     ("network/primal/laws.py", "_stem", "", "labels of constraints"),
-    ("network/primal/unspecified.py", "_owners", "", "a store alone in its coordinate has one measure either way"),
+    ("network/primal/store_guesses.py", "_owners", "", "a store alone in its coordinate has one measure either way"),
     ("network/reflection.py", "_moduli", "rpartition(", _TEXT),
 )
 """Mutants that cannot change a result: file, function, what the line holds, and the reason."""

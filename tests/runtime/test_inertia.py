@@ -16,11 +16,11 @@ sys.path.insert(0, str(Path(__file__).parents[1] / "compiler"))
 
 from catalogue import ONE, PLACE
 from chains import blank, coordinate
-from sysdyn.cli.run.generated import module_of
+from sysdyn.cli.run.numpy_module import module_of
 from sysdyn.cli.run.prepare import Prepared
 from sysdyn.compiler.pipeline import compile_network
 from sysdyn.dsl.model import expression as x
-from sysdyn.dsl.model.network import Constraint, Energy, Initial
+from sysdyn.dsl.model.network import Constraint, EnergyTerm, InitialCondition
 from sysdyn.runtime.model.description import describe
 
 M = np.array([[101.0, -100.0], [-100.0, 100.0]])
@@ -35,9 +35,9 @@ def system_of(matrix, formulation, *guesses):
         spring = x.power(x.var("x", "q"), x.const(2.0))
         network = blank(
             coordinates=(coordinate("x"), coordinate("y")),
-            energies=(Energy("T*", x.add(*terms), (), PLACE), Energy("V", spring, (), PLACE)),
+            energies=(EnergyTerm("T*", x.add(*terms), (), PLACE), EnergyTerm("V", spring, (), PLACE)),
             constraints=(tie,) if guesses else (),
-            initials=tuple(Initial(n, x.const(v), False, (), PLACE) for n, v in zip(f, guesses, strict=False)),
+            initials=tuple(InitialCondition(n, x.const(v), False, (), PLACE) for n, v in zip(f, guesses, strict=False)),
         )
         model = compile_network(network, formulation, "numpy")
         binding = model.bind()

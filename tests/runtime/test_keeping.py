@@ -9,7 +9,7 @@ import pytest
 from sysdyn.runtime.model import core_library as lib
 from sysdyn.runtime.trace.keeping import Files, Memory, keeping
 from sysdyn.runtime.trace.trace import Trace, TraceError
-from sysdyn.runtime.trace.trace_store import BEFORE, Column, Layout, Parameter, clear, input_output
+from sysdyn.runtime.trace.trace_store import BEFORE, Column, Layout, TraceParameter, clear, input_output
 
 LAYOUT = Layout((Column("x", 1, "m", "the way", True), Column("e", 0, "V", "e", False)), 2, {"title": "t"}, ())
 
@@ -110,7 +110,7 @@ def test_the_head_of_a_row_is_as_long_in_the_core_as_in_what_reads_it():
 
 
 def test_parameters_of_one_unit_and_of_several_come_back(tmp_path):
-    given = (Parameter("m", 2.0, "kg"), Parameter("a/b", 3.0, "kg"), Parameter("k", 4.0, "N/m"))
+    given = (TraceParameter("m", 2.0, "kg"), TraceParameter("a/b", 3.0, "kg"), TraceParameter("k", 4.0, "N/m"))
     kept = Files(tmp_path / "trace.h5")
     with kept.claimed():
         writer = kept.writer(Layout(LAYOUT.columns, 2, {}, given), True)
@@ -122,7 +122,7 @@ def test_parameters_of_one_unit_and_of_several_come_back(tmp_path):
 @pytest.mark.long
 def test_each_of_many_parameters_keeps_its_own_number_and_unit(tmp_path):
     units = ("F", "ohm", "kg*m^2/s^2")
-    given = tuple(Parameter(f"C{k}.C", (-1.0) ** k * np.exp(0.37 * k), units[k % 3]) for k in range(300))
+    given = tuple(TraceParameter(f"C{k}.C", (-1.0) ** k * np.exp(0.37 * k), units[k % 3]) for k in range(300))
     kept = Files(tmp_path / "trace.h5")
     with kept.claimed():
         writer = kept.writer(Layout(LAYOUT.columns, 2, {}, given), True)

@@ -5,7 +5,7 @@ import pytest
 from scipy.integrate import solve_ivp
 from sysdyn import api
 from sysdyn.cli.run import running
-from sysdyn.cli.run.request.asked import Request
+from sysdyn.cli.run.request.run_request import RunRequest
 from sysdyn.dsl.text.diagnostics import Report
 
 RISE = """model rise {
@@ -60,7 +60,7 @@ RANGED = " relative to range"
 def test_what_moves_by_a_small_part_of_its_size_is_noted(tmp_path, base, ranged, noted):
     report = Report()
     text = write(tmp_path, f"accuracy 1e-4 on T{ranged}", base)
-    assert running.run(Request(str(text), output=str(tmp_path / "out.h5")), report).exit == 0
+    assert running.run(RunRequest(str(text), output=str(tmp_path / "out.h5")), report).exit == 0
     notes = [d for d in report if d.code == "N922"]
     assert bool(notes) == noted
     assert all("T moves by 1.5 K" in d.message and "on T relative to range" in d.help for d in notes)

@@ -7,7 +7,7 @@ from sysdyn.runtime.accuracy.options import Options, choose_index
 from sysdyn.runtime.model.carrier import load
 from sysdyn.runtime.model.failures import SolverFailure, WrongOption
 from sysdyn.runtime.simulate import simulate
-from sysdyn.runtime.trace.trace import Parameter, Trace
+from sysdyn.runtime.trace.trace import Trace, TraceParameter
 
 # references.json: values at the last instant of each system
 END = {
@@ -156,7 +156,7 @@ def test_two_runs_without_timings_are_equal_byte_for_byte(tmp_path):
             tmp_path / f"{name}.h5",
             4.0,
             timings=False,
-            parameters=(Parameter("m1", 1.0, "kg"),),
+            parameters=(TraceParameter("m1", 1.0, "kg"),),
         )
     assert (tmp_path / "a.h5").read_bytes() == (tmp_path / "b.h5").read_bytes()
     assert not list(tmp_path.glob(".*"))

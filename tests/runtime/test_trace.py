@@ -15,7 +15,7 @@ from sysdyn.runtime.accuracy.options import Options
 from sysdyn.runtime.model.carrier import load
 from sysdyn.runtime.model.failures import TraceError
 from sysdyn.runtime.simulate import simulate
-from sysdyn.runtime.trace.trace import Column, Layout, Parameter, Trace
+from sysdyn.runtime.trace.trace import Column, Layout, Trace, TraceParameter
 from sysdyn.runtime.trace.writing import TraceWriter
 
 HERE = Path(__file__).parent
@@ -25,7 +25,7 @@ def written(path, **options):
     manifest, binding, module = models.pendulum()
     settings = {
         "every": 0.1,
-        "parameters": (Parameter("m", 1.13, "kg"),),
+        "parameters": (TraceParameter("m", 1.13, "kg"),),
         "attributes": {"model": "pendulum"},
     }
     return simulate(manifest, binding, load(module), Options(path, 0.0, 4.0, **{**settings, **options}))
@@ -58,7 +58,7 @@ def test_layout(tmp_path):
 def test_parameters_are_read_without_objects_for_each(tmp_path, monkeypatch):
     """A ladder of 1000 cells has 2000: h5py's objects took two thirds of the time to open its trace."""
     path, made = tmp_path / "o.h5", []
-    known = tuple(Parameter(f"R[{k}].R", 0.5 + k, "ohm" if k % 2 else "1") for k in range(300))
+    known = tuple(TraceParameter(f"R[{k}].R", 0.5 + k, "ohm" if k % 2 else "1") for k in range(300))
     written(path, parameters=known)
     create = h5py.Dataset.__init__
     monkeypatch.setattr(h5py.Dataset, "__init__", lambda *given, **named: (made.append(1), create(*given, **named))[1])

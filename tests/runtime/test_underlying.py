@@ -13,9 +13,9 @@ sys.path.insert(0, str(Path(__file__).parents[1] / "compiler"))
 
 from catalogue import network, state
 from reference_values import load
-from sysdyn.cli.run.generated import module_of
+from sysdyn.cli.run.numpy_module import module_of
 from sysdyn.cli.run.prepare import Prepared
-from sysdyn.cli.run.request.asked import Request as Simulation
+from sysdyn.cli.run.request.run_request import RunRequest as Simulation
 from sysdyn.cli.run.running import run
 from sysdyn.compiler.pipeline import compile_network
 from sysdyn.dsl.model import expression as x

@@ -6,7 +6,7 @@ from functools import cache
 from pathlib import Path
 
 import numpy as np
-from sysdyn.cli.run.request.asked import Request
+from sysdyn.cli.run.request.run_request import RunRequest
 from sysdyn.cli.run.running import run
 from sysdyn.dsl.elaborate import files
 from sysdyn.dsl.parser.parse import parse
@@ -67,8 +67,8 @@ def network(body, end, traces, start="", unit="s"):
 
 def names(text):
     """Components of the elements in a text's models, with their levels: gear, gear.losses."""
-    models = [i for i in parsed(SourceText("network.sd", text)).items if isinstance(i, syntax.Model)]
-    found = [s for model in models for s in walk(model.body) if isinstance(s, syntax.Instance)]
+    models = [i for i in parsed(SourceText("network.sd", text)).items if isinstance(i, syntax.ModelDefinition)]
+    found = [s for model in models for s in walk(model.body) if isinstance(s, syntax.InstanceStatement)]
     return [n for s in found for n in (s.component.names[0], ".".join(s.component.names))]
 
 
@@ -76,7 +76,7 @@ def walk(body):
     """Statements, those inside loops and levels too."""
     for statement in body:
         yield statement
-        if isinstance(statement, (syntax.For, syntax.Level)):
+        if isinstance(statement, (syntax.ForStatement, syntax.LevelStatement)):
             yield from walk(statement.body)
 
 
@@ -92,11 +92,11 @@ class Entry:
     """A component of the library and the module that holds it."""
 
     module: str
-    component: syntax.Component
+    component: syntax.ComponentDefinition
 
     @property
     def levels(self):
-        return [s for s in self.component.body if isinstance(s, syntax.Level)]
+        return [s for s in self.component.body if isinstance(s, syntax.LevelStatement)]
 
 
 @cache
@@ -105,7 +105,7 @@ def library():
     found = {}
     for path in sorted(files.LIBRARY.glob("*.sd")):
         for item in parsed(SourceText.read(path)).items:
-            if isinstance(item, syntax.Component):
+            if isinstance(item, syntax.ComponentDefinition):
                 assert item.name.name not in found
                 found[item.name.name] = Entry(path.stem, item)
     return found
@@ -116,7 +116,7 @@ def traced(folder, text, at, *, accuracy=ACCURACY, formulation=None):
     path = Path(folder) / "network.sd"
     path.write_text(text, encoding="utf-8")
     report = Report()
-    request = Request(
+    request = RunRequest(
         str(path),
         formulation=formulation,
         accuracy=accuracy,

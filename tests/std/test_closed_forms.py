@@ -48,9 +48,9 @@ def test_nothing_of_the_library_lacks_a_row():
 def test_nothing_of_the_prelude_lacks_a_row():
     items = files.prelude().items
     rows = {row.component for row in TABLES["prelude"]}
-    assert {i.name.name for i in items if isinstance(i, (syntax.Domain, syntax.Bundle))} == rows
+    assert {i.name.name for i in items if isinstance(i, (syntax.DomainDefinition, syntax.BundleDefinition))} == rows
     texts = " ".join(row.text for row in TABLES["prelude"])
-    assert [i.name.name for i in items if isinstance(i, syntax.Const) and i.name.name not in texts] == []
+    assert [i.name.name for i in items if isinstance(i, syntax.ConstDefinition) and i.name.name not in texts] == []
 
 
 @pytest.mark.long

@@ -115,7 +115,7 @@ def test_refused(element, tmp_path):
 def test_every_requirement_has_a_row():
     rows = [names(f"model m {{{NODES}  E: {element}\n}}")[0] for element in REFUSED]
     wanted = {
-        name: sum(isinstance(s, syntax.Require) for s in walk(entry.component.body))
+        name: sum(isinstance(s, syntax.RequireStatement) for s in walk(entry.component.body))
         for name, entry in library().items()
     }
     assert {n: k for n, k in wanted.items() if rows.count(n) < k} == {}

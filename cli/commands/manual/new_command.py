@@ -25,6 +25,7 @@ def command(console: Console, name: Path) -> int:
     written = skeleton.write(folder)
     model = skeleton.model_name(folder)
     said = _record_golden(folder, f"{model}.sd")
+    # the golden trace is recorded by a run, not copied
     kept = sorted(p for p in (folder / "golden").rglob("*") if p.is_file()) if said is None else []
     console.result = {"folder": str(name), "files": [str(p.relative_to(folder)) for p in (*written, *kept)]}
     if said is not None:
@@ -32,6 +33,7 @@ def command(console: Console, name: Path) -> int:
         return console.finish(FAULT)
     if not console.quiet:
         console.data("\n".join(str(name / p.relative_to(folder)) for p in (*written, *kept)))
+    # installed from a folder or a file: CI takes a wheel that the project holds
     if distribution.requirement(sysdyn.__version__).startswith(distribution.WHEELS):
         console.say(f"CI installs {distribution.NAME} from {distribution.WHEELS}/: put a wheel of it there (pip wheel)")
     console.say(f"next: cd {shlex.quote(str(name))}; sysdyn simulate {model}.sd --scene {skeleton.GOLDEN_SCENE}")

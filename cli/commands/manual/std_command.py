@@ -15,6 +15,7 @@ def command(console: Console, name: str | None) -> int:
     from sysdyn.cli.manual import library
 
     module = (name or "").removeprefix("std.")
+    # `std` has the index, `std thermal` a module, `std Wall` or `std thermal.Wall` an entry
     entry = None if name is None or (name.startswith("std.") and "." not in module) else library.find(name)
     if entry is None and name is not None and module not in library.modules():
         raise UsageError(_no_such_entry(name, [e.name for e in library.entries()], [*library.modules()]))

@@ -125,6 +125,7 @@ def _mend_file(console: Console, path: str) -> list[dict[str, object]]:
 
 def _form(console: Console, chosen: str | None, files: tuple[str, ...]) -> None:
     """Let the console show findings in the form asked for."""
+    # the page for people, unless --json is given
     if chosen is None or chosen == "full":
         if chosen and console.as_json:
             raise UsageError("--json and --output-format full: one of them")
@@ -134,7 +135,8 @@ def _form(console: Console, chosen: str | None, files: tuple[str, ...]) -> None:
     if chosen == "json":
         console.as_json = True
         return
-    from sysdyn.cli.page import findings
+    from sysdyn.cli.page import finding_formats
 
-    forms = {"concise": findings.concise, "github": findings.github, "sarif": findings.sarif}
-    console.format = forms.get(chosen) or (lambda found, plain: findings.junit(found, plain, files))
+    # junit alone needs the names of files: those without findings pass
+    forms = {"concise": finding_formats.concise, "github": finding_formats.github, "sarif": finding_formats.sarif}
+    console.format = forms.get(chosen) or (lambda found, plain: finding_formats.junit(found, plain, files))

@@ -8,11 +8,11 @@ from typing import Any
 import click
 from sysdyn.cli.console import Console, with_console
 from sysdyn.cli.export import files
-from sysdyn.cli.export.asked import formed_of, network_of, report_impossible
+from sysdyn.cli.export.index_form import formed_of, network_of, report_impossible
 from sysdyn.cli.options import chosen
 from sysdyn.cli.page.columns import align
 from sysdyn.cli.run.prepare import Prepared, prepare
-from sysdyn.cli.run.request.asked import Request
+from sysdyn.cli.run.request.run_request import RunRequest
 from sysdyn.compiler.forms import descriptor
 from sysdyn.compiler.model import energies
 from sysdyn.compiler.program import program_text
@@ -36,7 +36,7 @@ def command(console: Console, folder: str | None, dump: str | None, explain: boo
 
     DIR/residual.c and binding.c (or residual.py), sysdyn_model.h, binding.json, manifest.json.
     """
-    request = Request(**options)
+    request = RunRequest(**options)
     with ex.fresh():
         network = network_of(request, console.report)
         if network is None:

@@ -8,7 +8,7 @@ from typing import Any
 import click
 from sysdyn.cli.console import Console, with_console
 from sysdyn.cli.options import chosen
-from sysdyn.cli.run.request.asked import Request
+from sysdyn.cli.run.request.run_request import RunRequest
 
 FORMS = ("descriptor", "matrices", "canonical", "underlying", "linear", "port_hamiltonian", "efforts", "elements")
 
@@ -29,7 +29,7 @@ def command(console: Console, form: str, alphabet: str, no_prune: bool, index: s
     elements: the law of each store and dissipator with T, T*, V, V*, D, G side by side.
     port_hamiltonian: E z' = (J - R) e + G u with E^T e = dH/dz, J = -J^T, R >= 0 (whether it is, by `check --explain`).
     """
-    from sysdyn.cli.analysis.asked import compile_target
+    from sysdyn.cli.analysis.operating_point import compile_target
     from sysdyn.cli.equations.forms import content_of
     from sysdyn.cli.equations.sheet import Sheets
     from sysdyn.cli.equations.typeset import page
@@ -38,7 +38,7 @@ def command(console: Console, form: str, alphabet: str, no_prune: bool, index: s
     from sysdyn.dsl.model import expression as ex
 
     with ex.fresh():
-        request = Request(index=index, **{**options, "backend": "numpy"})
+        request = RunRequest(index=index, **{**options, "backend": "numpy"})
         # the linear form alone moves inputs
         inputs = None if form == "linear" else ()
         made = compile_target(request, console.report, inputs=inputs, choose=still)

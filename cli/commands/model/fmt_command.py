@@ -46,13 +46,16 @@ def _one(console: Console, name: str, *, check: bool, diff: bool) -> bool:
     source = decode("<stdin>", sys.stdin.buffer) if name == "-" else SourceText.read(name)
     tree, problems = parse(source)
     console.report.extend(problems)
+    # a text that cannot be read has no layout
     if any(d.severity == "error" for d in problems):
         return False
     text = format_text(tree)
     if diff:
         console.data("".join(difference(source, text)), verbatim=True)
+    # standard input comes out on standard output
     elif name == "-" and not check:
         console.data(text, verbatim=True)
+    # a file that is in layout keeps its time of change
     elif text != source.text and not check:
         whole_files.replace(real(Path(name)), text)
     return text != source.text

@@ -8,7 +8,7 @@ import click
 from sysdyn.cli import whole_files
 from sysdyn.cli.console import Console, with_console
 from sysdyn.cli.failures import UsageError
-from sysdyn.cli.spice.model_text import Writer
+from sysdyn.cli.spice.model_text import ModelTextWriter
 from sysdyn.cli.spice.reading import Reader
 from sysdyn.cli.spice.writing import format_fast
 from sysdyn.dsl.text.decoding import decode
@@ -25,16 +25,18 @@ def command(console: Console, file: str, output: str | None) -> int:
     .subckt, .global, .ic, .temp, .options, and .include of its own folder. What cannot be said is an error with its
     line; what a model has beyond it a warning.
     """
+    # `-o -` is standard output, which is the default
     output = None if output == "-" else output
     if output is not None and not output.endswith(".sd"):
         raise UsageError(f"-o {output}: a model's text ends in .sd")
     source = decode("stdin", sys.stdin.buffer) if file == "-" else SourceText.read(file)
     reader = Reader(source, console.report)
-    text = Writer(reader.netlist, source, console.report).text()
+    text = ModelTextWriter(reader.netlist, source, console.report).text()
     if console.report.failed:
         return console.finish(1)
     text = format_fast(text)
     console.result = {"text": text, "output": output}
+    # the text itself; else a file, and a line that says so
     if output is None:
         console.data(text, verbatim=True)
     else:

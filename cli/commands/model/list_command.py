@@ -23,7 +23,7 @@ def command(
     console: Console, file: str, scene: str | None, model: str | None, levels: tuple[tuple[str, str], ...]
 ) -> int:
     """List the names in FILE: parameters with units and values, what can be traced, scenes, components and levels."""
-    from sysdyn.cli.manual import names
+    from sysdyn.cli.manual import model_names
 
     document = targets.read(file, console.report)
     # the model that is named, or all of the file
@@ -35,14 +35,14 @@ def command(
         with ex.fresh():
             found = load.listing(document, target.model, target.scene, console.report, levels)
             if found is not None:
-                accounts.append(names.account(document, target.model, found))
+                accounts.append(model_names.account(document, target.model, found))
     console.result = {"file": file, "models": accounts}
     if accounts:
-        console.data(names.table(accounts))
+        console.data(model_names.table(accounts))
     elif not console.report.failed:
         console.say(f"{file}: no model")
     return console.finish()
 
 
-def _models(document: load.Document) -> list[targets.Target]:
+def _models(document: load.ParsedFile) -> list[targets.Target]:
     return [targets.Target(document, m, None) for m in document.models.values()]

@@ -9,7 +9,7 @@ from sysdyn.cli.console import Console, with_console
 from sysdyn.cli.failures import SOLVER
 from sysdyn.cli.options import chosen
 from sysdyn.cli.progress import SEARCH
-from sysdyn.cli.run.request.asked import Request
+from sysdyn.cli.run.request.run_request import RunRequest
 
 
 @with_console("equilibrium")
@@ -34,7 +34,7 @@ def command(console: Console, tries: int, no_prune: bool, index: str | None, **o
     from sysdyn.dsl.model import expression as ex
 
     with console.progress(ahead=SEARCH) as line, ex.fresh():
-        made = equilibria(Request(index=index, **options), tries, console.report, line)
+        made = equilibria(RunRequest(index=index, **options), tries, console.report, line)
     if made is None:
         return console.finish(1)
     found, states, why = made

@@ -12,7 +12,7 @@ from sysdyn.cli.console import Console, with_console
 from sysdyn.cli.failures import SOLVER, UsageError
 from sysdyn.cli.options import INDICES, chosen
 from sysdyn.cli.page.columns import align, complex_text
-from sysdyn.cli.run.request.asked import Request
+from sysdyn.cli.run.request.run_request import RunRequest
 from sysdyn.runtime.trace.opening import replaceable
 
 KINDS = ("bode", "nyquist", "step")
@@ -61,16 +61,16 @@ def command(
         raise UsageError("--at together with --equilibrium: an instant of a run, or a state of rest")
     kinds = _kinds(response)
     _check_outputs(files)
-    from sysdyn.cli.analysis.linear import linearise
+    from sysdyn.cli.analysis.linearisation import linearise
     from sysdyn.cli.analysis.states import state_of
-    from sysdyn.cli.run.request.asked import separate
+    from sysdyn.cli.run.request.run_request import separate
     from sysdyn.dsl.model import expression as ex
     from sysdyn.runtime.linear.tangent import NoLinearisation
 
     # what is linearised, and where
     form = "3" if index in (None, "auto") else str(index)
     assert form in INDICES
-    request = Request(until=at, index=index, **options)
+    request = RunRequest(until=at, index=index, **options)
     names = None if outputs is None else tuple(text.strip() for text in separate(outputs))
     moved = None if inputs is None else separate(inputs)
     with ex.fresh():
@@ -79,7 +79,7 @@ def command(
             if failure:
                 console.complain(failure, SOLVER)
             return console.finish(SOLVER if failure else 1)
-        from sysdyn.cli.analysis.linear import inputs_of
+        from sysdyn.cli.analysis.linearisation import inputs_of
 
         try:
             linear = linearise(found, inputs_of(found.target, found.prepared, moved), form)
@@ -173,8 +173,8 @@ def _check_outputs(files: Iterable[str]) -> None:
 
 def _write(file: str, linear: Any, curves: Any, over: Any, kinds: tuple[str, ...], name: str, console: Console) -> None:
     """One file of matrices or one picture."""
-    from sysdyn.cli.analysis.files import written
-    from sysdyn.cli.analysis.picture import page, picture
+    from sysdyn.cli.analysis.linear_files import written
+    from sysdyn.cli.analysis.response_plots import page, picture
 
     kind = Path(file).suffix
     if kind in DATA:

@@ -13,9 +13,9 @@ from sysdyn.cli.failures import SOLVER, UsageError
 from sysdyn.cli.options import scene_command
 from sysdyn.cli.page.columns import align
 from sysdyn.cli.reduce.activity import Activities
-from sysdyn.cli.reduce.reduction import Cost, Reduced, reduce
+from sysdyn.cli.reduce.reduction import Cost, ReducedModel, reduce
 from sysdyn.cli.report.balance import WORDS
-from sysdyn.cli.run.request.asked import Request
+from sysdyn.cli.run.request.run_request import RunRequest
 
 KINDS = (".png", ".svg")
 BAR = 24
@@ -39,7 +39,7 @@ def command(
     """
     from sysdyn.cli.commands.simulation.trade_command import budget_of
 
-    request = Request(**options)
+    request = RunRequest(**options)
     # the reduced text has to go somewhere
     if request.file == "-" and output is None and not only:
         raise UsageError("a text from standard input: -o names the reduced one")
@@ -84,10 +84,11 @@ def _activity(found: Activities) -> str:
     return align(rows, right=(2, 3, 4))
 
 
-def _summary(found: Reduced, target: Path, *, kept: bool, timings: bool) -> str:
+def _summary(found: ReducedModel, target: Path, *, kept: bool, timings: bool) -> str:
     """A table of the trials, and what the reduction came to."""
     rows = [["change", "", "share", "error", ""]]
     for t in found.trials:
+        # - where no run was made
         error = "-" if t.error is None else f"{t.error:.1e}"
         reason = t.reason if len(t.reason) <= 70 else t.reason[:67] + "..."
         rows.append([t.label, t.how, f"{100.0 * t.share:.3f} %", error, "kept" if t.kept else reason])
@@ -95,6 +96,7 @@ def _summary(found: Reduced, target: Path, *, kept: bool, timings: bool) -> str:
     if not found.ended:
         lines.append("the budget of wall time is spent: elements that were not tried may go too")
     number = sum(t.kept for t in found.trials)
+    # nothing could go: no target was written
     if not kept:
         return "\n".join([*lines, f"{found.name}: every element that was tried is needed for {found.accuracy:.0e}"])
     gone = "1 element is" if number == 1 else f"{number} elements are"
@@ -112,7 +114,7 @@ def _costs(full: Cost, reduced: Cost, *, timings: bool) -> str:
     return text
 
 
-def _result(found: Reduced, target: str | None, *, timings: bool) -> dict[str, Any]:
+def _result(found: ReducedModel, target: str | None, *, timings: bool) -> dict[str, Any]:
     """The object of --json: activities, trials, costs."""
 
     def cost(c: Cost | None) -> dict[str, Any] | None:

@@ -16,7 +16,7 @@ from sysdyn.cli.page.columns import spent
 from sysdyn.cli.progress import ProgressLine
 
 if TYPE_CHECKING:
-    from sysdyn.cli.run.request.asked import Request
+    from sysdyn.cli.run.request.run_request import RunRequest
     from sysdyn.cli.run.running import Ran
 
 SHOWN = 4
@@ -29,11 +29,11 @@ SHOWN = 4
 @click.option("--no-timings", is_flag=True, help="Leave wall and CPU times out of the trace.")
 def command(console: Console, progress: str, no_timings: bool, **options: Any) -> int:
     """Simulate a scene of FILE and write its trace."""
-    from sysdyn.cli.run.request.asked import Request
+    from sysdyn.cli.run.request.run_request import RunRequest
     from sysdyn.cli.run.running import run
     from sysdyn.cli.run.start.starting import change_lines, first_lines, strategy_note
 
-    request = Request(timings=not no_timings, **options)
+    request = RunRequest(timings=not no_timings, **options)
     if request.output == "-" and console.as_json:
         raise UsageError("-o - and --json both want standard output")
     with console.progress(progress) as line:
@@ -68,7 +68,7 @@ def _streams(output: str | None) -> bool:
     return path.exists() and not path.is_file() and not path.is_dir()
 
 
-def _simulate_to_stream(request: Request, console: Console, line: ProgressLine) -> Ran | None:
+def _simulate_to_stream(request: RunRequest, console: Console, line: ProgressLine) -> Ran | None:
     """HDF5 cannot be streamed: the trace is made in a folder of its own and copied."""
     import tempfile
 

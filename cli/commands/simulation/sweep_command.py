@@ -12,10 +12,10 @@ from sysdyn.cli.failures import UsageError, worst
 from sysdyn.cli.options import chosen, solved
 from sysdyn.cli.page.columns import align
 from sysdyn.cli.run.many.crew import cores
-from sysdyn.cli.run.request.asked import Request, default_output
-from sysdyn.cli.sweep.in_core import KEEPS
-from sysdyn.cli.sweep.kept import Kept
+from sysdyn.cli.run.request.run_request import RunRequest, default_output
+from sysdyn.cli.sweep.core_cases import KEEPS
 from sysdyn.cli.sweep.one_run import Runner
+from sysdyn.cli.sweep.run_records import Kept
 from sysdyn.cli.sweep.study import SAMPLES, read, study
 from sysdyn.cli.sweep.sweeping import Swept, axes_of, summary, sweep, to_json
 from sysdyn.runtime.trace.opening import replaceable
@@ -75,7 +75,7 @@ def command(
         over = (*found.over, *over)
         options["scene"] = options["scene"] or said.pop("scene", None)
         options["model"] = options["model"] or said.pop("model", None)
-    request = Request(file, **options)
+    request = RunRequest(file, **options)
     kept = keep or said.get("keep") or "traces"
     if kept not in KEEPS:
         raise UsageError(f"keep = '{kept}': one of {', '.join(KEEPS)}")
@@ -106,13 +106,14 @@ def _show_results(console: Console, found: Swept, plot: str | None) -> int:
     console.result = to_json(found)
     console.results(_table(found))
     if plot is not None:
-        from sysdyn.cli.sweep.picture import picture
+        from sysdyn.cli.sweep.sweep_picture import picture
 
         whole_files.write(plot, picture(found, Path(plot).suffix[1:]))
     resumed = f", {found.resumed} of them from before" if found.resumed else ""
     console.say(f"{found.output}: {len(found.cases)} runs{resumed}")
     if found.alone and len(found.cases) > SHOWN:
         console.say(f"one by one: {found.alone}")
+    # the first failures with their reasons, then how many more
     for kept in found.failed[:SHOWN]:
         console.complain(f"run {kept.run} ({_settings_text(found, kept.run)}): {kept.reason}", kept.exit, kept.finding)
     if len(found.failed) > SHOWN:

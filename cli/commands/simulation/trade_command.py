@@ -16,11 +16,11 @@ from sysdyn.cli.failures import SOLVER, UsageError
 from sysdyn.cli.options import scene_command, side_by_side
 from sysdyn.cli.page.columns import align, fit_columns, refusals, terminal
 from sysdyn.cli.run.request import lock, targets
-from sysdyn.cli.run.request.asked import Request, instants_of
+from sysdyn.cli.run.request.run_request import RunRequest, instants_of
 from sysdyn.cli.trade.pages import HEADS, cells, page, picture, verdict
 from sysdyn.cli.trade.reference import NoReference
 from sysdyn.cli.trade.search import tolerance
-from sysdyn.cli.trade.traded import Combination, Measured, Refusal, Traded, meets
+from sysdyn.cli.trade.trade_results import Combination, Measured, RefusedCombination, Traded, meets
 from sysdyn.cli.trade.trading import trade
 from sysdyn.dsl import load
 from sysdyn.dsl.text.diagnostics import Report, SourceText
@@ -59,7 +59,7 @@ def command(
     # a lock stands beside its file
     if locks and options["file"] == "-":
         raise UsageError("--lock of a text from standard input: a lock stands beside a file")
-    request = Request(**options)
+    request = RunRequest(**options)
     try:
         with tempfile.TemporaryDirectory(prefix="sysdyn-") as folder, console.progress(progress) as line:
             budget = budget_of(max_wall)
@@ -99,13 +99,13 @@ def budget_of(text: str | None) -> float | None:
         return None
     report = Report()
     nothing = load.document(SourceText("--max-wall", ""), report)
-    seconds = instants_of(Request("", max_wall=text), nothing, report)[2]
+    seconds = instants_of(RunRequest("", max_wall=text), nothing, report)[2]
     if seconds is None:
         raise UsageError(f"--max-wall {text}: a number of seconds, or a time with its unit")
     return seconds
 
 
-def _lock(request: Request, found: Traded, best: Measured) -> Path:
+def _lock(request: RunRequest, found: Traded, best: Measured) -> Path:
     """Writes the choice for its scene."""
     scene = targets.target_of(request, Report())
     assert scene is not None
@@ -118,9 +118,11 @@ def _report_faults(found: Traded, console: Console, use: str) -> int:
     """Says what is wrong; the exit code."""
     if not found.ended:
         console.say("the budget of wall time is spent: settings that were not tried may be cheaper; ask again to go on")
+    # a chaotic model: beyond some instant no error can be told
     if found.reference.until < found.span[1]:
         text = f"errors count up to {found.reference.until:g} s of {found.span[1]:g} s: beyond, the finest runs differ"
         console.say(text)
+    # a combination reaches the accuracy: how to use it
     if use:
         console.results(use, verbatim=True)
         return 0
@@ -129,7 +131,7 @@ def _report_faults(found: Traded, console: Console, use: str) -> int:
     return SOLVER
 
 
-def command_of(request: Request, best: Measured, name: str) -> str:
+def command_of(request: RunRequest, best: Measured, name: str) -> str:
     """The command line that runs a setting."""
     c = best.combination
     words = ["sysdyn", "simulate", request.file]
@@ -176,7 +178,7 @@ def _best_of_each(found: Traded) -> list[Measured]:
     return [*best.values(), *found.pareto]
 
 
-def _refusal_lines(refusals_: Iterable[Refusal]) -> list[str]:
+def _refusal_lines(refusals_: Iterable[RefusedCombination]) -> list[str]:
     """What cannot be run, those with one reason together."""
     return refusals(
         (

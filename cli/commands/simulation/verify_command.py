@@ -14,7 +14,7 @@ from sysdyn.cli.page.columns import align, fit_columns, refusals, terminal
 
 if TYPE_CHECKING:
     from sysdyn.cli.verify.agreement import Gap
-    from sysdyn.cli.verify.verified import Disagreement, Refusal, Run, Verified
+    from sysdyn.cli.verify.verify_results import Disagreement, RefusedFormulation, Verified, VerifiedRun
 
 SPARE = ("constraints", "energy J", "estimate", "index")
 """Columns that a narrow terminal has no room for."""
@@ -38,11 +38,11 @@ def command(
     ledger of a run is off or the solver stops; what the scene expects is listed, and never decides.  Formulations run
     side by side where that pays, with equal results.
     """
-    from sysdyn.cli.run.request.asked import Request
+    from sysdyn.cli.run.request.run_request import RunRequest
     from sysdyn.cli.run.request.sizes import sizes
     from sysdyn.cli.verify.verification import verify
 
-    request = Request(timings=not no_timings, **options)
+    request = RunRequest(timings=not no_timings, **options)
     # large models run at the sizes that their folder names for this
     path, reduced = (Path(), ()) if full else sizes(request.file)
     given = {name for name, _ in request.settings}
@@ -203,14 +203,14 @@ def _table(found: Verified, *, timings: bool) -> str:
 def _refusal_lines(found: Verified) -> list[str]:
     """Formulations left out, those with one reason together."""
 
-    def reason(r: Refusal) -> str:
+    def reason(r: RefusedFormulation) -> str:
         text = r.reason.removeprefix(f"not expressible in {r.formulation}: ").removeprefix(f"{r.formulation} of ")
         return "not supported yet" if r.code == "E608" else f"{r.code} {text}"
 
     return refusals((r.formulation, reason(r)) for r in found.refusals)
 
 
-def _cells(run: Run) -> list[str]:
+def _cells(run: VerifiedRun) -> list[str]:
     o = run.outcome
     estimate = "-" if o.error_estimate is None else f"{o.error_estimate:.1e}"
     effort = [str(o.statistics["steps"]), f"{1e3 * o.timings['cpu_integrate_s']:.3g}"]
@@ -218,7 +218,7 @@ def _cells(run: Run) -> list[str]:
     return [run.formulation, run.method, o.index, f"{run.accuracy:.0e}", *effort, estimate, *meters]
 
 
-def _gap_cells(run: Run, gap: Gap | None, found: Verified) -> list[str]:
+def _gap_cells(run: VerifiedRun, gap: Gap | None, found: Verified) -> list[str]:
     first = "the reference" if run is found.runs[0] else ""
     if run.failure:
         return ["-", ", ".join(filter(None, (first, "stopped early"))), f"{run.outcome.reached:.4g}"]
@@ -238,13 +238,16 @@ def _verdict(found: Verified) -> str:
     """One line: how many runs agree, or that they do not."""
     ended = [run for run in found.runs if not run.failure]
     number = len(ended)
+    # runs that are met and differ, or twins that do
     if found.apart or any(not d.doubted for d in found.disagreements) or not all(t.agree for t in found.twins):
         return f"{number} runs: they disagree"
+    # only runs that have not reached their accuracy differ
     if found.disagreements:
         return f"{number} runs, of which some are not met: the others agree"
     if len(ended) == len(found.runs):
         return f"{number} runs agree on {len(found.compared)} quantities"
     stopped = f"{len(found.runs) - number} of {len(found.runs)} runs stopped early"
+    # one run agrees with nothing
     if number < 2:
         return f"{stopped}: nothing is known from them"
     return f"{stopped}: the other {number} agree on {len(found.compared)} quantities"
@@ -276,7 +279,7 @@ def _result(found: Verified, *, keep: bool, timings: bool) -> dict[str, Any]:
     }
 
 
-def _run_object(run: Run, gap: Gap | None, *, keep: bool, timings: bool) -> dict[str, Any]:
+def _run_object(run: VerifiedRun, gap: Gap | None, *, keep: bool, timings: bool) -> dict[str, Any]:
     """A run as an object of --json."""
     o = run.outcome
     return {

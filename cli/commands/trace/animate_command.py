@@ -6,7 +6,7 @@ import click
 from sysdyn.cli import whole_files
 from sysdyn.cli.console import Console, with_console
 from sysdyn.cli.failures import UsageError
-from sysdyn.cli.page.named import destination, label, open_trace, quantities
+from sysdyn.cli.page.figure_sources import destination, label, open_trace, quantities
 
 KINDS = (".html", ".svg")
 

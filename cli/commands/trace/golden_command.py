@@ -19,10 +19,10 @@ from sysdyn.cli.plain_files import inside, project
 from sysdyn.dsl.text.source import real
 
 if TYPE_CHECKING:
-    from sysdyn.cli.golden.book import Accepted, Golden
-    from sysdyn.cli.golden.checking import Case, Mutant
-    from sysdyn.cli.golden.recording import Recorded
-    from sysdyn.cli.run.request.asked import Request
+    from sysdyn.cli.golden.book import Accepted, GoldenScene
+    from sysdyn.cli.golden.golden_checks import Case, Mutant
+    from sysdyn.cli.golden.recording import GoldenRecord
+    from sysdyn.cli.run.request.run_request import RunRequest
 
 RTOL = 2e-4
 """At 1e-3 a change of 1 % in a parameter of middling influence goes unnoticed."""
@@ -80,11 +80,11 @@ def record(
     Measures the reference's own error (a hundredth of its tolerance, a second method) and refuses a tolerance below
     ten times that; runs every formulation that can express the scene.
     """
-    from sysdyn.cli.golden.book import BOOK, Accepted, Golden, read
+    from sysdyn.cli.golden.book import BOOK, Accepted, GoldenScene, read
     from sysdyn.cli.run.request import targets
-    from sysdyn.cli.run.request.asked import Request
+    from sysdyn.cli.run.request.run_request import RunRequest
 
-    request = Request(**asked)
+    request = RunRequest(**asked)
     if not (0.0 < rtol < 1.0 and 0.0 <= atol < math.inf):
         raise UsageError(f"--rtol {rtol:g} --atol {atol:g}: between 0 and 1, and not negative")
     if request.file == "-":
@@ -111,7 +111,7 @@ def record(
     if isinstance(found, int):
         return console.finish(found)
     said = request.settings, request.until
-    golden = Golden(place, file, label, scene or "", rtol, atol, 0, 0, 0, 0, 0, (), *said)
+    golden = GoldenScene(place, file, label, scene or "", rtol, atol, 0, 0, 0, 0, 0, (), *said)
     golden = _golden(golden, found, Accepted("recorded", f"first record, {found.method}"))
     code = _keep(console, golden, found, size)
     console.result = {
@@ -160,12 +160,12 @@ def check(
     # whether goldens notice changes of parameters
     if mutants:
         return _mutants(console, goldens, jobs)
-    from sysdyn.cli.golden.jobs import Asked, in_processes
+    from sysdyn.cli.golden.jobs import GoldenJob, in_processes
 
     drawn = bool(html_file) or pages
     cases = []
     # as they come
-    for found in in_processes([Asked(g, formulations, methods, backends or ("c",), drawn) for g in goldens], jobs):
+    for found in in_processes([GoldenJob(g, formulations, methods, backends or ("c",), drawn) for g in goldens], jobs):
         cases += found
         for case in found:
             console.say(f"{'ok' if case.exit == 0 else 'FAILED':6} {case.label}: {case.message} ({case.seconds:.1f} s)")
@@ -175,7 +175,7 @@ def check(
 def _report(console: Console, cases: Sequence[Case], junit_file: str | None, html_file: str | None, pages: bool) -> int:
     """Show what the checks found, as text, JUnit and page; the exit code."""
     from sysdyn.cli.golden.changes import page
-    from sysdyn.cli.golden.checking import checkable
+    from sysdyn.cli.golden.golden_checks import checkable
     from sysdyn.cli.page.junit import junit
 
     wrong = sorted((c for c in cases if c.exit), key=lambda c: -c.ratio)
@@ -198,7 +198,7 @@ def _report(console: Console, cases: Sequence[Case], junit_file: str | None, htm
     return console.finish(worst(c.exit for c in cases))
 
 
-def _mutants(console: Console, goldens: Sequence[Golden], jobs: int | None) -> int:
+def _mutants(console: Console, goldens: Sequence[GoldenScene], jobs: int | None) -> int:
     """`check --mutate`: exit 1 where a golden does not notice a change that it could have noticed."""
     from dataclasses import asdict
 
@@ -268,7 +268,7 @@ def accept(
     goldens = book.find(Path(folder), names)
     renewed = [golden if rtol is None else replace(golden, rtol=rtol) for golden in goldens]
     # recorded anew, compared with what is kept
-    for golden, wanted, found in zip(goldens, renewed, _again(console, renewed, jobs), strict=True):
+    for golden, wanted, found in zip(goldens, renewed, _record_each(console, renewed, jobs), strict=True):
         if isinstance(found, int):
             code = worst((code, found))
             continue
@@ -291,7 +291,7 @@ def accept(
     return console.finish(code)
 
 
-def _again(console: Console, goldens: Sequence[Golden], jobs: int | None) -> Iterator[Recorded | int]:
+def _record_each(console: Console, goldens: Sequence[GoldenScene], jobs: int | None) -> Iterator[GoldenRecord | int]:
     """The record of each golden, made anew; the exit code after saying why there is none."""
     from sysdyn.cli.golden.jobs import record_again
     from sysdyn.cli.run.many.crew import Lost, each
@@ -344,7 +344,9 @@ def list_(console: Console, folder: str) -> int:
 # ---- what record and accept share
 
 
-def _record_or_exit(console: Console, request: Request, rtol: float, atol: float, jobs: int | None) -> Recorded | int:
+def _record_or_exit(
+    console: Console, request: RunRequest, rtol: float, atol: float, jobs: int | None
+) -> GoldenRecord | int:
     """The record; the exit code after saying why there is none."""
     from sysdyn.cli.golden import recording
     from sysdyn.cli.golden.runs import Stopped
@@ -357,7 +359,7 @@ def _record_or_exit(console: Console, request: Request, rtol: float, atol: float
         return code
 
 
-def _golden(golden: Golden, found: Recorded, accepted: Accepted) -> Golden:
+def _golden(golden: GoldenScene, found: GoldenRecord, accepted: Accepted) -> GoldenScene:
     """A golden with what was measured, and why it is right."""
     return replace(
         golden,
@@ -371,7 +373,7 @@ def _golden(golden: Golden, found: Recorded, accepted: Accepted) -> Golden:
     )
 
 
-def _keep(console: Console, golden: Golden, found: Recorded, size: float) -> int:
+def _keep(console: Console, golden: GoldenScene, found: GoldenRecord, size: float) -> int:
     """Write trace, structure and golden.toml; the exit code."""
     from sysdyn.cli.golden import book
     from sysdyn.cli.golden.trace_file import write_trace

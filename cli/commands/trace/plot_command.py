@@ -9,7 +9,7 @@ import click
 from sysdyn.cli import whole_files
 from sysdyn.cli.console import Console, with_console
 from sysdyn.cli.page.columns import terminal
-from sysdyn.cli.page.named import destination, label, open_trace, quantities
+from sysdyn.cli.page.figure_sources import destination, label, open_trace, quantities
 
 if TYPE_CHECKING:
     from sysdyn.runtime.trace.trace import Trace

@@ -25,10 +25,10 @@ def command(console: Console, progress: str, output: str | None, **options: Any)
         raise UsageError(f"'{output}': a report is an .html")
     from sysdyn.cli.report.collect import collect
     from sysdyn.cli.report.page import page
-    from sysdyn.cli.run.request.asked import Request, default_output
+    from sysdyn.cli.run.request.run_request import RunRequest, default_output
     from sysdyn.dsl.model import expression as ex
 
-    request = Request(**options)
+    request = RunRequest(**options)
     with ex.fresh():
         with console.progress(progress) as line:
             # everything that the page shows, collected once

@@ -6,7 +6,7 @@ from typing import Any
 
 from sysdyn.cli.failures import classify
 from sysdyn.cli.run.request import targets
-from sysdyn.dsl import alone, load
+from sysdyn.dsl import load, unused_components
 from sysdyn.dsl.model import expression as ex
 from sysdyn.dsl.model.network import Network
 from sysdyn.dsl.text.diagnostics import Diagnostic, ModelError, Report
@@ -47,7 +47,7 @@ def file_checked(asked: tuple[str, bool, bool]) -> Checked:
                     said.append(("data", f"{path}: {target.name}: " + _passivity(summary)))
         parts = dict[str, bool]()
         # components that no model uses are checked by themselves
-        for name, own in alone.check_unused_components(document):
+        for name, own in unused_components.check_unused_components(document):
             report.extend(own)
             parts[name] = not own.failed and not wrong
             if parts[name]:
@@ -88,7 +88,7 @@ def _check_start(target: targets.Target, network: Network, report: Report) -> di
 def _check_prepared(target: targets.Target, network: Network, report: Report) -> dict[str, object]:
     """Check numbers, instants, start and passivity of a network; the counts that `check` shows."""
     from sysdyn.cli.run.prepare import prepare  # lowering and arrays: not needed where the text has errors
-    from sysdyn.cli.run.request.asked import Request
+    from sysdyn.cli.run.request.run_request import RunRequest
     from sysdyn.cli.run.request.scene_numbers import wrong_numbers
     from sysdyn.cli.run.start.starting import change_lines, counted_as, start
     from sysdyn.cli.run.verdict.expectations import missing_goldens
@@ -102,7 +102,7 @@ def _check_prepared(target: targets.Target, network: Network, report: Report) ->
     scene = network.scene
     # numbers of the scene, before anything is computed with them
     if scene is not None:
-        bare = Request(target.document.file.source.name)
+        bare = RunRequest(target.document.file.source.name)
         report.extend(wrong_numbers(target, prepared.network, prepared.binding.evaluate, bare))
         if report.failed:
             return {"ok": False}

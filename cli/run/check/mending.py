@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from sysdyn.cli.run.request.targets import all_targets
-from sysdyn.dsl import alone, load
+from sysdyn.dsl import load, unused_components
 from sysdyn.dsl.model import expression as ex
 from sysdyn.dsl.text.diagnostics import Diagnostic, Edit, Report, SourceText
 
@@ -36,7 +36,7 @@ def _found(source: SourceText) -> list[Diagnostic]:
     for target in all_targets(document, report):
         with ex.fresh():
             load.network(target.document, target.model, target.scene, report, required=False)
-    for _, own in alone.check_unused_components(document):
+    for _, own in unused_components.check_unused_components(document):
         report.extend(own)
     return [d for d in report if d.severity == "error"]
 

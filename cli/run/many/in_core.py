@@ -14,7 +14,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 from sysdyn.cli.run.prepare import Prepared
-from sysdyn.cli.run.request.asked import Request, options_of, stops
+from sysdyn.cli.run.request.run_request import RunRequest, options_of, stops
 from sysdyn.cli.run.request.targets import Target
 from sysdyn.cli.run.running import Ran
 from sysdyn.compiler.binding.binding import Binding
@@ -44,9 +44,10 @@ class InCore:
     """
 
     def __init__(
-        self, request: Request, target: Target, prepared: Prepared, nominal: Callable[[], Ran | None], keep: int
+        self, request: RunRequest, target: Target, prepared: Prepared, nominal: Callable[[], Ran | None], keep: int
     ) -> None:
         """nominal: a run with the text's own numbers."""
+        # what the core cannot do by itself: runs go one by one then
         if prepared.backend != "c":
             raise NotApplicableError("the model is not compiled to C")
         if prepared.network.events or prepared.network.switches:
@@ -55,6 +56,7 @@ class InCore:
         if keep == ROWS:
             self._as_ever()
         self.options = self._options(request, target)
+        # options that need Python between steps
         why = obstacle(self.options)
         if why is not None:
             raise NotApplicableError(why)
@@ -69,7 +71,7 @@ class InCore:
         if any(node.op == "param" and not str(node.data).startswith("static ") for node in read):
             raise NotApplicableError("a claim about counts reads parameters")
 
-    def _options(self, request: Request, target: Target) -> Options:
+    def _options(self, request: RunRequest, target: Target) -> Options:
         """The options of every run."""
         read = Read(self.prepared.binding.parameters)
         seen = replace(self.prepared, binding=replace(self.prepared.binding, parameters=read), layouts={})

@@ -73,10 +73,12 @@ def hashes(target: Target) -> dict[str, str]:
         return path.relative_to(top).as_posix() if path.is_relative_to(top) else str(path)
 
     def take(path: Path, items: tuple[syntax.TopLevel, ...]) -> None:
+        # two files that import each other
         if name(path) in found:
             return
         found[name(path)] = hashlib.sha256(path.read_bytes()).hexdigest()
         for other in _files(path.parent, items):
+            # an import, with what it imports; else a table's file
             if other.is_file() and other.suffix == ".sd":
                 take(other, parse(SourceText.read(other))[0].items)
             elif other.is_file():
@@ -91,7 +93,7 @@ def _files(folder: Path, items: tuple[syntax.TopLevel, ...]) -> Iterator[Path]:
     for item in items:
         if isinstance(item, syntax.Import) and item.module.names[0] != "std":
             yield real(folder.joinpath(*item.module.names).with_suffix(".sd"))
-        elif isinstance(item, syntax.Table) and item.file is not None:
+        elif isinstance(item, syntax.TableDefinition) and item.file is not None:
             path = real(folder / item.file)
             if path.is_relative_to(folder):
                 yield path
@@ -160,8 +162,8 @@ def settings_from_lock(
     if any(dict(levels).get(path, name) != name for path, name in lock.levels):
         return Taken(None, None, None, (), None, lock.accuracy, "")
     body = target.scene.body if target.scene else ()
-    scene = next((s.name.name for s in body if isinstance(s, syntax.Formulation)), None)
-    solver = next((s for s in body if isinstance(s, syntax.Solver)), None)
+    scene = next((s.name.name for s in body if isinstance(s, syntax.FormulationStatement)), None)
+    solver = next((s for s in body if isinstance(s, syntax.SolverStatement)), None)
     # what the command line and the scene say already
     here = formulation or scene
     same = here in (None, lock.formulation)
@@ -170,7 +172,7 @@ def settings_from_lock(
     both = same and index in (None, lock.index) and method in (None, lock.method)
     both = both and not by_scene and (solver is None or method is not None)
     source = target.document.file.source
-    said = [_path(source, s.target) for s in body if isinstance(s, syntax.SceneLevel)]
+    said = [_path(source, s.target) for s in body if isinstance(s, syntax.SceneLevelStatement)]
     above = {*(path for path, _ in levels), *said}
     # levels that nobody names
     rest = tuple((path, name) for path, name in lock.levels if path not in above)

@@ -19,7 +19,7 @@ from sysdyn.dsl.text.diagnostics import Diagnostic, Place, Span
 from sysdyn.dsl.tree import syntax
 
 if TYPE_CHECKING:
-    from sysdyn.cli.run.request.asked import Request
+    from sysdyn.cli.run.request.run_request import RunRequest
 
 INSTANTS = 2e7
 """Of a trace with a fixed interval: they are laid out before the run, about 50 bytes each."""
@@ -33,7 +33,7 @@ _ORDERS = {"bdf": (1.0, 2.0, 3.0, 4.0, 5.0), "radau": (5.0, 9.0, 13.0)}
 Value = Callable[[Node], float]
 
 
-def wrong_numbers(target: Target, network: Network, value: Value, request: Request) -> Iterator[Diagnostic]:
+def wrong_numbers(target: Target, network: Network, value: Value, request: RunRequest) -> Iterator[Diagnostic]:
     """What is wrong of what the request leaves to the scene."""
     scene = network.scene
     assert scene is not None
@@ -46,12 +46,12 @@ def wrong_numbers(target: Target, network: Network, value: Value, request: Reque
     for wanted in dict.fromkeys(value(node) for node in said if node is not None):
         if not FINEST_ACCURACY <= wanted < 1.0:
             text = f"accuracy {wanted:g}: from {FINEST_ACCURACY:g} to less than 1, what double precision can tell"
-            yield Diagnostic("E906", text, _place(target, scene, syntax.Accuracy), "accuracy 1e-6")
+            yield Diagnostic("E906", text, _place(target, scene, syntax.AccuracyStatement), "accuracy 1e-6")
     # limits are whole numbers
     for name, node in scene.limits:
         most = value(node)
         if not (math.isfinite(most) and round(most) >= 1):
-            place = _place(target, scene, syntax.Limit, lambda s, name=name: s.name.name == name)
+            place = _place(target, scene, syntax.LimitStatement, lambda s, name=name: s.name.name == name)
             yield Diagnostic("E912", f"limit {name} {most:g}: a whole number from 1 on", place, f"limit {name} 10000")
     yield from _solver(target, scene, value, request)
 
@@ -65,15 +65,15 @@ def _span(target: Target, scene: Scene, value: Value, *, until: bool) -> Iterato
     # backwards, or never ending
     if not (until or right):
         text = f"the time is from {t0:g} s to {t1:g} s: a run goes forward and ends"
-        yield Diagnostic("E912", text, _place(target, scene, syntax.Time), "time 0 s to 10 s")
+        yield Diagnostic("E912", text, _place(target, scene, syntax.TimeStatement), "time 0 s to 10 s")
     # instants that doubles do not tell apart
     elif not until and (text := beyond(t0, t1)):
-        yield Diagnostic("E912", text, _place(target, scene, syntax.Time), "time 0 s to 10 s")
+        yield Diagnostic("E912", text, _place(target, scene, syntax.TimeStatement), "time 0 s to 10 s")
         return
     every = None if scene.every is None else value(scene.every)
     if every is None or not (right or until):
         return
-    place = _place(target, scene, syntax.Trace, lambda s: s.every is not None, lambda s: s.every.span)
+    place = _place(target, scene, syntax.TraceStatement, lambda s: s.every is not None, lambda s: s.every.span)
     # the interval of the trace
     if not every > 0.0:
         yield Diagnostic("E912", f"the interval of the trace is {every:g} s: it is positive", place, "every 10 ms")
@@ -104,10 +104,10 @@ def beyond(t0: float, t1: float) -> str:
     return f"from {t0:g} s to {t1:g} s are {t1 - t0:g} s: {least:g} s to {most:g} s are what double precision allows"
 
 
-def _solver(target: Target, scene: Scene, value: Value, request: Request) -> Iterator[Diagnostic]:
+def _solver(target: Target, scene: Scene, value: Value, request: RunRequest) -> Iterator[Diagnostic]:
     """The options of the solver, and the step that one of them needs."""
     said = {name: value(node) for name, node in scene.solver_options}
-    place = _place(target, scene, syntax.Solver)
+    place = _place(target, scene, syntax.SolverStatement)
     # lengths of time are positive
     for name in ("step", "longest"):
         if not said.get(name, 1.0) > 0.0:

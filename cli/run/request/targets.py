@@ -11,23 +11,23 @@ from typing import TYPE_CHECKING
 
 from sysdyn.cli.failures import UsageError, instead
 from sysdyn.dsl import load
-from sysdyn.dsl.load import Document
+from sysdyn.dsl.load import ParsedFile
 from sysdyn.dsl.text.decoding import decode
 from sysdyn.dsl.text.diagnostics import Diagnostic, Report, SourceText
 from sysdyn.dsl.tree import syntax
 from sysdyn.values import dataclass
 
 if TYPE_CHECKING:
-    from sysdyn.cli.run.request.asked import Request
+    from sysdyn.cli.run.request.run_request import RunRequest
 
 
 @dataclass(frozen=True, slots=True)
 class Target:
     """A model under a scene, or by itself."""
 
-    document: Document
-    model: syntax.Model
-    scene: syntax.Scene | None
+    document: ParsedFile
+    model: syntax.ModelDefinition
+    scene: syntax.SceneDefinition | None
 
     @property
     def name(self) -> str:
@@ -36,7 +36,7 @@ class Target:
         return f"{self.scene.name.name} of {model}" if self.scene else model
 
 
-def read(path: str, report: Report, text: str | None = None) -> Document:
+def read(path: str, report: Report, text: str | None = None) -> ParsedFile:
     """Parse a file, or standard input where path is '-'; text: what stood there, if it was read before."""
     if path == "-":
         source = decode("<stdin>", sys.stdin.buffer) if text is None else SourceText("<stdin>", text)
@@ -74,7 +74,7 @@ def _hidden(path: Path) -> bool:
     return any(part.startswith(".") for part in path.parts)
 
 
-def all_targets(document: Document, report: Report) -> list[Target]:
+def all_targets(document: ParsedFile, report: Report) -> list[Target]:
     """Every scene, and every model without one."""
     found = []
     for scene in document.scenes.values():
@@ -85,7 +85,7 @@ def all_targets(document: Document, report: Report) -> list[Target]:
     return found + [Target(document, m, None) for n, m in document.models.items() if n not in used]
 
 
-def one(document: Document, path: str, model: str | None, scene: str | None, report: Report) -> Target | None:
+def one(document: ParsedFile, path: str, model: str | None, scene: str | None, report: Report) -> Target | None:
     """The target that the options name, or the only one there is; None where its text has errors.
 
     UsageError with the list where there are several and none is named.
@@ -113,24 +113,24 @@ def one(document: Document, path: str, model: str | None, scene: str | None, rep
     return whole(document, path, model, None, report)
 
 
-def target_of(request: Request, report: Report, choose: Callable[..., Target | None] = one) -> Target | None:
+def target_of(request: RunRequest, report: Report, choose: Callable[..., Target | None] = one) -> Target | None:
     """What a request means of its file, by `one`, `still` or `whole`."""
     document = read(request.file, report, request.text)
     return choose(document, request.file, request.model, request.scene, report)
 
 
-def with_text(request: Request, target: Target) -> Request:
+def with_text(request: RunRequest, target: Target) -> RunRequest:
     """The request for other processes: what stood on standard input is read once."""
     return replace(request, text=target.document.file.source.text if request.file == "-" else None)
 
 
-def still(document: Document, path: str, model: str | None, scene: str | None, report: Report) -> Target | None:
+def still(document: ParsedFile, path: str, model: str | None, scene: str | None, report: Report) -> Target | None:
     """As `one`, of what needs no scene to run: where there are several and none is named it is the model by itself."""
     several = [s for s in document.scenes.values() if model is None or s.model.names == (model,)]
     return (whole if len(several) > 1 else one)(document, path, model, scene, report)
 
 
-def whole(document: Document, path: str, model: str | None, scene: str | None, report: Report) -> Target | None:
+def whole(document: ParsedFile, path: str, model: str | None, scene: str | None, report: Report) -> Target | None:
     """The scene that is named, else a model by itself: the one named, or the only one there is.
 
     None where its text has errors; UsageError with the list where there are several models and none is named.
@@ -157,7 +157,7 @@ def refuse_unsupported(found: Iterable[Diagnostic]) -> Iterator[Diagnostic]:
     return (replace(d, code="E608", help=d.help or help_) if d.code == "N608" else d for d in found)
 
 
-def _nothing(document: Document, path: str, what: str, name: str, names: list[str], report: Report) -> Exception:
+def _nothing(document: ParsedFile, path: str, what: str, name: str, names: list[str], report: Report) -> Exception:
     if report.failed and not names:
         from sysdyn.dsl.text.diagnostics import ModelError
 

@@ -334,11 +334,13 @@ def _static(prepared: Prepared, claim: Expectation, known: dict[str, int | None]
         return prepared.binding.evaluate(node)
 
     left, right, within = evaluate([claim.left, claim.right, claim.within or ex.const(0.0)], lookup)
+    # a claim on a count that nobody knows is neither met nor missed
     if missing:
         message = f"static quantity '{missing[0]}' is not known for this model (too large, or undetermined)"
         report.note("N608", message, claim.place)
     elif not holds(claim.operator, left, right, within):
         unit = "" if claim.unit.text == "1" else f" {claim.unit.text}"
+        # both sides, or the left alone where the right is a number of the text
         told = (left, right) if ex.variables(claim.right) or claim.right.op != "const" else (left,)
         found = "found " + " and ".join(f"{value:.9g}{unit}" for value in told)
         report.error("E909", f"expect failed: {claim.text.removeprefix('expect ')}, {found}", claim.place)
@@ -356,6 +358,7 @@ def where_holds(operator: str, left: Any, right: Any, within: Any) -> Any:
             return np.abs(left - right) <= within
         case "!=":
             return np.abs(left - right) > within
+        # `a < b within r` grants r, and equality with it
         case "<" | "<=":
             loose = (operator == "<=") | (within != 0.0)
             return np.where(loose, left <= right + within, left < right)

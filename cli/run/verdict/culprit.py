@@ -109,9 +109,11 @@ def _written(place: Place | None, function: str) -> str | None:
         return None
     text = place.source.text[place.span.start : place.span.end]
     starts = [m.start() for m in re.finditer(rf"(?<!\w){function}\(", text)]
+    # of two calls nobody knows which one failed
     if len(starts) != 1:
         return None
     depth = 0
+    # up to the parenthesis that closes it
     for k in range(starts[0], len(text)):
         depth += (text[k] == "(") - (text[k] == ")")
         if text[k] == ")" and not depth:

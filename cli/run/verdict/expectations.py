@@ -29,7 +29,7 @@ WORSE = 1.1
 
 
 @dataclass(frozen=True, slots=True)
-class Claim:
+class JudgedClaim:
     """One expectation: ok None where it could not be judged; value and time where it was judged (worst or first)."""
 
     text: str
@@ -72,41 +72,41 @@ def _near(time: Floats, at: float) -> NDArray[np.bool_]:
     return np.asarray(np.abs(time - at) <= 1e-12 * abs(at))
 
 
-def judge(prepared: Prepared, outcome: Outcome, report: Report, *, finished: bool) -> tuple[Claim, ...]:
+def judge(prepared: Prepared, outcome: Outcome, report: Report, *, finished: bool) -> tuple[JudgedClaim, ...]:
     """All expectations of the scene; those that fail are reported as E909."""
     claims = [_claim(prepared, outcome, k, e, report, finished) for k, e in enumerate(prepared.network.expectations)]
     claims += [_golden(prepared, outcome, g, report, finished) for g in prepared.network.goldens]
     return tuple(claims)
 
 
-def _claim(prepared: Prepared, outcome: Outcome, k: int, e: Expectation, report: Report, finished: bool) -> Claim:
+def _claim(prepared: Prepared, outcome: Outcome, k: int, e: Expectation, report: Report, finished: bool) -> JudgedClaim:
     """Judge one claim on the rows that were kept; not known where the run did not come that far."""
     text = e.text.removeprefix("expect ")
     time, left, right, within = _sides(outcome, k, e)
     # at the last row
     if e.moment == "finally":
         if not finished:
-            return Claim(text, None, None, None)
+            return JudgedClaim(text, None, None, None)
         time, left, right, within = time[-1:], left[-1:], right[-1:], within[-1:]
     # at its instant
     elif e.at is not None:
         at = prepared.binding.evaluate(e.at)
         here = np.flatnonzero(_near(time, at))
         if not here.size and not finished:
-            return Claim(text, None, None, None)
+            return JudgedClaim(text, None, None, None)
         if not here.size:
             report.error("E909", f"expect failed: the run does not reach {at:g} s", e.place)
-            return Claim(text, False, None, at)
+            return JudgedClaim(text, False, None, at)
         time, left, right, within = time[here[:1]], left[here[:1]], right[here[:1]], within[here[:1]]
     open_ = _open(outcome, k, e)
     # always: the first row that breaks it
     for t, a, b, w in zip(time, left, right, within, strict=True):
         if not holds(e.operator, a, b, w + open_):
             _report(outcome, e, (t, a, b, w), report)
-            return Claim(text, False, float(a), float(t))
+            return JudgedClaim(text, False, float(a), float(t))
     if not time.size:
-        return Claim(text, None, None, None)
-    return Claim(text, True, float(left[-1]), float(time[-1]))
+        return JudgedClaim(text, None, None, None)
+    return JudgedClaim(text, True, float(left[-1]), float(time[-1]))
 
 
 def _place_of(golden: Golden) -> Path:
@@ -122,16 +122,16 @@ def missing_goldens(goldens: Iterable[Golden], code: str) -> list[Diagnostic]:
     ]
 
 
-def _golden(prepared: Prepared, outcome: Outcome, golden: Golden, report: Report, finished: bool) -> Claim:
+def _golden(prepared: Prepared, outcome: Outcome, golden: Golden, report: Report, finished: bool) -> JudgedClaim:
     """`expect golden "F" within r`: the quantities that F also has, by the comparison of `sysdyn diff`."""
     text = f'golden "{golden.file}"'
     path = _place_of(golden)
     # a file that is not there
     if missing := missing_goldens((golden,), "E907"):
         report.extend(missing)
-        return Claim(text, None, None, None)
+        return JudgedClaim(text, None, None, None)
     if not finished:
-        return Claim(text, None, None, None)
+        return JudgedClaim(text, None, None, None)
     from sysdyn.cli.compare.diffing import common, differences, sentence
     from sysdyn.runtime.comparison.recorded import Recorded
     from sysdyn.runtime.comparison.verdict import Incomparable, Tolerance
@@ -145,12 +145,12 @@ def _golden(prepared: Prepared, outcome: Outcome, golden: Golden, report: Report
             verdict = differences(common(reference, names), common(trace, names), tube)
     except (Incomparable, TraceError) as error:
         report.error("E909", f"expect failed: {text} cannot be compared: {error}", golden.place)
-        return Claim(text, False, None, None)
+        return JudgedClaim(text, False, None, None)
     worst = verdict.worst
     found = (worst.worst.test, worst.worst.time) if worst else (None, None)
     if worst is not None and not verdict.equal:
         report.error("E909", f"expect failed: {text} within {within:g}: {sentence(worst)}", golden.place)
-    return Claim(text, verdict.equal, *found)
+    return JudgedClaim(text, verdict.equal, *found)
 
 
 @contextlib.contextmanager

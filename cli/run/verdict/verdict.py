@@ -21,7 +21,7 @@ from sysdyn.dsl.model.expression import topological
 from sysdyn.dsl.text.diagnostics import Place, Report
 from sysdyn.dsl.tree import syntax
 from sysdyn.runtime.accuracy.options import Options
-from sysdyn.runtime.judgement import Cancelled, NotMet
+from sysdyn.runtime.judgement import Cancelled, Shortfall
 from sysdyn.runtime.linear.growth import growth
 from sysdyn.runtime.linear.states import moving
 from sysdyn.runtime.model.failures import RowLabel, SolverFailure
@@ -261,13 +261,16 @@ def differences(prepared: Prepared, cancelled: Iterable[Cancelled], report: Repo
 def note_rest(prepared: Prepared, started: Started, outcome: Outcome, report: Report) -> None:
     """N924 of a run in which nothing has moved, though what disturbs it would have grown by FOLDS powers of e."""
     system, state = started.system, started.state
+    # too large to look at, in motion at the start, or without a trace
     if system.unknowns > UNKICKED or moving(system, state) or (trace := outcome.traced) is None:
         return
+    # something moved
     if any(
         (trace[name].values != trace[name].values[0]).any() for name in trace.names if not name.startswith("audit.")
     ):
         return
     rate, name = growth(system, state)
+    # a pendulum upright: at rest, yet a disturbance grows by e^folds
     folds = rate * (outcome.reached - state.t)
     if folds > FOLDS:
         (shown,) = names_of(prepared.network, [name])
@@ -305,7 +308,9 @@ def _flat_start(prepared: Prepared, started: Started) -> tuple[RowLabel, ...]:
     return by_element(prepared, without_slope(system, state.t, *state.for_form(system)))
 
 
-def _inaccurate(prepared: Prepared, missed: NotMet, place: Place, flat: tuple[RowLabel, ...], report: Report) -> None:
+def _inaccurate(
+    prepared: Prepared, missed: Shortfall, place: Place, flat: tuple[RowLabel, ...], report: Report
+) -> None:
     """E920; flat: laws by whose slopes the method steps, and that have none at the start."""
     where = next((o.place for o in prepared.network.observations if o.name == missed.element), place)
     stops = _stops(prepared, missed.element) if missed.undefined else None
@@ -344,7 +349,7 @@ def _stops(prepared: Prepared, quantity: str) -> str | None:
     return next((str(n.data[0]) for n in read if n.op == "table" and n.data[0] in stopping), None)
 
 
-def _report_ledger(target: Target, prepared: Prepared, missed: NotMet, report: Report) -> None:
+def _report_ledger(target: Target, prepared: Prepared, missed: Shortfall, report: Report) -> None:
     assert missed.row is not None
     what = "the energy ledger" if missed.what == "energy" else "an invariant of dynamic variables"
     time = "" if missed.time is None else f" at t = {missed.time:.9g} s"
@@ -401,7 +406,9 @@ def _place(
         return said[0] if said[0].source is own else _declaration_place(target, prepared, label)
     # a limit of the scene
     if error.cause in ("max_steps", "max_wall", "max_events") and target.scene is not None:
-        limits = [s for s in target.scene.body if isinstance(s, syntax.Limit) and error.cause == f"max_{s.name.name}"]
+        limits = [
+            s for s in target.scene.body if isinstance(s, syntax.LimitStatement) and error.cause == f"max_{s.name.name}"
+        ]
         return Place(own, limits[0].span if limits else target.scene.name.span)
     return prepared.network.place
 

@@ -25,9 +25,9 @@ from sysdyn.compiler.forms.descriptor import (
     BLOCKS,
     Block,
     DescriptorForm,
-    Equations,
+    EquationFamily,
     Frozen,
-    Kernel,
+    LoopKernel,
     Summand,
     Unknowns,
 )
@@ -166,7 +166,8 @@ class _Freezer:
                 done[node] = self._frozen(node, held)
         return done[root]
 
-    def _again(self, branch: Node) -> Node:
+    def _rebuild_branch(self, branch: Node) -> Node:
+        """A branch of a frozen operation, rebuilt of frozen parts."""
         for node in topological([branch]):
             if node not in self.done:
                 self.done[node] = rebuild(node, tuple(self.done[a] for a in node.args))
@@ -193,8 +194,10 @@ class _Freezer:
             levels = (level, RESTS) if self.surfaces[k].jumps and node.data in (">=", "<=") else (level,)
             return either(as_said, *(compare("==", self.branch[k], const(b)) for b in levels))
         # abs, sign, max, ...: both branches, frozen in turn
-        above, below = (self._again(n) for n in ((found.above, found.below) if mine else (found.below, found.above)))
-        at_rest = const(0.0) if node.data == "sign" else self._again(found.above)
+        above, below = (
+            self._rebuild_branch(n) for n in ((found.above, found.below) if mine else (found.below, found.above))
+        )
+        at_rest = const(0.0) if node.data == "sign" else self._rebuild_branch(found.above)
         return self._branches(k, (above, at_rest, below), live, held)
 
     def _branches(self, k: int, sides: tuple[Node, Node, Node], live: Node, held: bool) -> Node:
@@ -263,7 +266,7 @@ class _Freezer:
             added.setdefault(block, []).append(Summand(row, (), expression))
 
         def observe(name: str, expression: Node) -> None:
-            rows.append(Equations("observe", name, name, "observe", "1", place, rate=False))
+            rows.append(EquationFamily("observe", name, name, "observe", "1", place, rate=False))
             add_to("observe", len(rows) - 1, expression)
             add_to("observe_scale", len(rows) - 1, magnitude(expression))
 
@@ -282,7 +285,7 @@ class _Freezer:
             owner = f"#sense {k}"
             senses.append(Unknowns(f"sense of {kink.text}", "e", owner, "1", kink.place))
             shapes.append((owner, ()))
-            rows.append(Equations("gamma", f"sense of {kink.text}", owner, "gamma", "1", kink.place))
+            rows.append(EquationFamily("gamma", f"sense of {kink.text}", owner, "gamma", "1", kink.place))
             # a gamma for the sense: the surface itself while it slides, else the side
             slides = compare("==", self.branch[k], const(SLIDES))
             # a length is no number: its own scale makes it one (Newton judges a row by its terms)
@@ -295,7 +298,7 @@ class _Freezer:
         families = self.before.families
         last = next((k for k, f in enumerate(families) if f.kind in BESIDE), len(families))
         blocks = tuple(self._block(b, added.pop(b.name, [])) for b in self.before.blocks)
-        made = (*blocks, *(Block(name, (Kernel((), tuple(new)),)) for name, new in added.items()))
+        made = (*blocks, *(Block(name, (LoopKernel((), tuple(new)),)) for name, new in added.items()))
         # blocks in the order of the contract, senses before what is observed
         order = {name: number for number, name in enumerate(BLOCKS)}
         ordered = sorted(made, key=lambda b: order.get(b.name, len(order)))
@@ -310,5 +313,5 @@ class _Freezer:
             rows = tuple(replace(s, expression=self.freeze(s.expression)) for s in kernel.rows)
             if not kernel.nest and new:
                 rows, new = (*rows, *new), []
-            kernels.append(Kernel(kernel.nest, rows))
-        return Block(block.name, (*kernels, *((Kernel((), tuple(new)),) if new else ())))
+            kernels.append(LoopKernel(kernel.nest, rows))
+        return Block(block.name, (*kernels, *((LoopKernel((), tuple(new)),) if new else ())))

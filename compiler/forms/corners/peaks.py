@@ -23,7 +23,7 @@ from itertools import product as product_of
 
 from sysdyn.compiler.forms.corners.kinks import JUDGED, Surface
 from sysdyn.compiler.forms.corners.turning import rising, turning, turns_in_conditions
-from sysdyn.compiler.forms.descriptor import DescriptorForm, Kernel
+from sysdyn.compiler.forms.descriptor import DescriptorForm, LoopKernel
 from sysdyn.dsl.model.expression import (
     Node,
     call,
@@ -102,7 +102,7 @@ def _hidden(root: Node, tables: Mapping[str, Table], watched: bool) -> Iterator[
         yield u, AT_ONCE
 
 
-def _watching(form: DescriptorForm, network: Network) -> Iterator[Kernel]:
+def _watching(form: DescriptorForm, network: Network) -> Iterator[LoopKernel]:
     """Rows whose signs events watch: one that is a peak is nothing but within it, too."""
     conditions = [e.condition for e in network.events if e.condition is not None]
     names = {v.data[0] for condition in conditions for v in variables(condition)}
@@ -110,7 +110,7 @@ def _watching(form: DescriptorForm, network: Network) -> Iterator[Kernel]:
     for kernel in block.kernels if block is not None else ():
         rows = tuple(s for s in kernel.rows if form.rows[s.row].owner in names)
         if rows:
-            yield Kernel(kernel.nest, rows)
+            yield LoopKernel(kernel.nest, rows)
 
 
 def _bodies(root: Node) -> Iterator[Node]:

@@ -12,7 +12,7 @@ from dataclasses import replace
 from itertools import product
 
 from sysdyn.compiler.forms.corners.kinks import JUDGED, MOST, SMOOTH, branches_of, smoothness, watched_branches
-from sysdyn.compiler.forms.descriptor import Block, DescriptorForm, Kernel, Summand
+from sysdyn.compiler.forms.descriptor import Block, DescriptorForm, LoopKernel, Summand
 from sysdyn.dsl.model.expression import Node, neg, substitute, topological
 from sysdyn.dsl.model.network import Network
 from sysdyn.dsl.model.values import Values, as_constants
@@ -46,13 +46,13 @@ def _own(node: Node) -> bool:
     return found is not None and any(n.op == "index" for n in topological([found.u]))
 
 
-def _iterations(kernel: Kernel, known: Values) -> Iterator[Iteration]:
+def _iterations(kernel: LoopKernel, known: Values) -> Iterator[Iteration]:
     """The elements of a nest."""
     for at in known.iterations(kernel.nest):
         yield as_constants(at)
 
 
-def _corners(kernel: Kernel, known: Values) -> set[Node]:
+def _corners(kernel: LoopKernel, known: Values) -> set[Node]:
     """The switching functions of all elements at which a row of the first is not smooth."""
     # all elements have one text: the first tells which operations are corners
     first = next(_iterations(kernel, known), None)
@@ -80,7 +80,7 @@ def _corners(kernel: Kernel, known: Values) -> set[Node]:
 
 def _block(block: Block, corners: set[Node], known: Values) -> Block:
     """A block whose kernels with corners are written out element by element."""
-    kernels: list[Kernel] = []
+    kernels: list[LoopKernel] = []
     for kernel in block.kernels:
         first = next(_iterations(kernel, known), None) if kernel.nest and any(map(_has_corner, kernel.rows)) else None
         if first is None or not any(_meets(s, first, corners) for s in kernel.rows):
@@ -90,7 +90,7 @@ def _block(block: Block, corners: set[Node], known: Values) -> Block:
             Summand(s.row, tuple(substitute(n, at) for n in s.at), substitute(s.expression, at))
             for at, s in product(_iterations(kernel, known), kernel.rows)
         ]
-        kernels.append(Kernel((), tuple(rows)))
+        kernels.append(LoopKernel((), tuple(rows)))
     return Block(block.name, tuple(kernels))
 
 

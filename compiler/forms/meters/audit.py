@@ -16,9 +16,9 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 
 from sysdyn.compiler.forms.assembly import Assembly
-from sysdyn.compiler.forms.descriptor import Equations
+from sysdyn.compiler.forms.descriptor import EquationFamily
 from sysdyn.compiler.forms.efforts import Effort
-from sysdyn.compiler.forms.meters.ledgers import POWERS, STORED, Element, Entry, Ledger, ledgers
+from sysdyn.compiler.forms.meters.ledgers import POWERS, STORED, EnergyAccount, Entry, Ledger, ledgers
 from sysdyn.compiler.model.energies import EnergyModel, Virtual
 from sysdyn.compiler.model.magnitudes import rounding
 from sysdyn.compiler.model.terms import Term, counter, local_variables
@@ -54,7 +54,7 @@ def add_audit(assembly: Assembly, model: EnergyModel, acting: Sequence[Effort]) 
     acting: every effort of the balances.  Returns the shapes of the row families of block ledger, by owner.
     """
     for name, unit in GLOBAL:
-        assembly.family(Equations("audit", name, name, "audit", unit, None))
+        assembly.family(EquationFamily("audit", name, name, "audit", unit, None))
     entries = tuple(_entries(model))
     units = {c.name: c.units.get("balance", "J") for c in model.coordinates}
     for entry in entries:
@@ -76,7 +76,7 @@ def _add_ledger(
         power = "W" if ledger.unit == "J" else f"({ledger.unit})/s"
         unit = ledger.unit if name == "stored" else power
         label = f"{ledger.kind}: {ledger.title}"
-        assembly.family(Equations("audit", label, f"#ledger {number} {name}", "ledger", unit, place))
+        assembly.family(EquationFamily("audit", label, f"#ledger {number} {name}", "ledger", unit, place))
     # what an element exchanges counts for the size of the turnover alone
     for entry in ledger.entries:
         if entry.account == "exchanged":
@@ -98,13 +98,13 @@ def _add_ledger(
         label = found.place.element or ledger.label(found)
         inertia = _of_one_rate(found, model)
         kind = f"{number} inertia" if inertia else str(number)
-        assembly.family(Equations("ledger", label, owner, kind, ledger.unit, found.place))
+        assembly.family(EquationFamily("ledger", label, owner, kind, ledger.unit, found.place))
         at = tuple(counter(k) for k in range(len(shape)))
         stored = _beyond_rounding(found.expression) if inertia else found.expression
         assembly.add("ledger", owner, at, found.nest, stored if len(shape) == len(found.nest) else magnitude)
 
 
-def _of_one_rate(element: Element, model: EnergyModel) -> bool:
+def _of_one_rate(element: EnergyAccount, model: EnergyModel) -> bool:
     """Whether it is the kinetic energy of one rate, and of nothing else that moves: its sign is that of an inertia."""
     rates = local_variables(element.expression, model.mirror.rate)
     if element.account != "kinetic" or len(rates) != 1:

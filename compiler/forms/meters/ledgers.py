@@ -18,11 +18,11 @@ from fractions import Fraction
 from typing import TypeVar
 
 from sysdyn.compiler.forms.efforts import Effort
-from sysdyn.compiler.model.energies import EnergyModel, Family, Row
+from sysdyn.compiler.model.energies import EnergyModel, Row, UnknownFamily
 from sysdyn.compiler.model.terms import Nest, local_variables, summands
 from sysdyn.dsl.model.calculus import derivative
+from sysdyn.dsl.model.connected_components import Joined
 from sysdyn.dsl.model.expression import Node, add, const, is_const, scale, var, variables
-from sysdyn.dsl.model.joined import Joined
 from sysdyn.dsl.text.diagnostics import Place
 from sysdyn.values import dataclass
 
@@ -48,7 +48,7 @@ class Entry:
 
 
 @dataclass(frozen=True, slots=True)
-class Element:
+class EnergyAccount:
     """What one statement stores, dissipates or is supplied with, for all iterations of a nest.  account: as of its
     entries, `stored` where these are kinetic and potential.
     """
@@ -71,14 +71,14 @@ class Ledger:
     names: tuple[str, ...]
     title: str
 
-    def elements(self) -> tuple[Element, ...]:
+    def elements(self) -> tuple[EnergyAccount, ...]:
         """What is stored, dissipated and supplied by statement; of an invariant term by term, for these may cancel."""
         if self.kind == "invariant":
             kept = (e for e in self.entries if e.account in STORED)
-            return tuple(Element("stored", e.nest, e.expression, e.place) for e in kept)
+            return tuple(EnergyAccount("stored", e.nest, e.expression, e.place) for e in kept)
         return elements(self.entries)
 
-    def label(self, element: Element) -> str:
+    def label(self, element: EnergyAccount) -> str:
         """A name for an element that no component or branch names: the unknown that it reads first."""
         nodes = [n for n in variables(element.expression) if n.op == "var" and n.data[0] in self.names]
         rates = [n for n in nodes if n.data[1] in ("f", "p")]
@@ -112,7 +112,7 @@ def _label_of(names: Sequence[str]) -> str:
     return f"energy of {', '.join(names[:SHOWN])}{more}"
 
 
-def elements(entries: Iterable[Entry]) -> tuple[Element, ...]:
+def elements(entries: Iterable[Entry]) -> tuple[EnergyAccount, ...]:
     """Entries of one statement, account and nest added up."""
     found: dict[tuple[str, int, int, str, str, Nest], list[Entry]] = {}
     for entry in entries:
@@ -121,7 +121,8 @@ def elements(entries: Iterable[Entry]) -> tuple[Element, ...]:
         key = (account, place.span.start, place.span.end, place.file, place.element, entry.nest)
         found.setdefault(key, []).append(entry)
     made = (
-        Element(_account(own), key[-1], add(*(e.expression for e in own)), own[0].place) for key, own in found.items()
+        EnergyAccount(_account(own), key[-1], add(*(e.expression for e in own)), own[0].place)
+        for key, own in found.items()
     )
     return tuple(e for e in made if not is_const(e.expression, 0.0))
 
@@ -211,7 +212,7 @@ def _of_momenta(model: EnergyModel, acting: Iterable[Effort]) -> Iterator[Ledger
             yield Ledger("invariant", unit, (*entries, *gross), tuple(moving), title)
 
 
-def _momentum(model: EnergyModel, family: Family, factor: float) -> Iterator[Entry]:
+def _momentum(model: EnergyModel, family: UnknownFamily, factor: float) -> Iterator[Entry]:
     """The summands of p + dT*/df: p of stores given by T(p)."""
     m = model.mirror
     own = [(t, n) for t in model.function(m.energy) for n in local_variables(t.expression, m.conjugate)]

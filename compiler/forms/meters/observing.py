@@ -9,10 +9,10 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 
 from sysdyn.compiler.forms.assembly import Assembly
-from sysdyn.compiler.forms.descriptor import Equations, Pin, Unknowns
+from sysdyn.compiler.forms.descriptor import EquationFamily, Pin, Unknowns
 from sysdyn.compiler.forms.efforts import acting, effort
 from sysdyn.compiler.forms.momenta import resolve
-from sysdyn.compiler.model.energies import EnergyModel, Target
+from sysdyn.compiler.model.energies import EnergyModel, InitialTarget
 from sysdyn.compiler.model.terms import counter, local_variables, split, without_nested
 from sysdyn.dsl.model.calculus import time_derivative
 from sysdyn.dsl.model.expression import Node, add, call, const, sub, substitute, var, variables
@@ -23,11 +23,11 @@ TURNED = ("kinetic", "potential", "dissipated", "supplied")
 
 
 @dataclass(frozen=True, slots=True)
-class Equation:
+class InitialEquation:
     """An `init` that pins no unknown: the owner of its row family, target - value = 0."""
 
     owner: str
-    target: Target
+    target: InitialTarget
 
 
 def observed_coordinates(model: EnergyModel, carriers: frozenset[str]) -> frozenset[str]:
@@ -55,7 +55,7 @@ def displacement_unknowns(model: EnergyModel, seen: frozenset[str]) -> frozenset
     return frozenset(found)
 
 
-def _unknowns(target: Target) -> list[Node]:
+def _unknowns(target: InitialTarget) -> list[Node]:
     return [n for n in variables(target.target) | variables(target.value) if n.op == "var"]
 
 
@@ -75,7 +75,7 @@ def add_observations(assembly: Assembly, model: EnergyModel, carriers: frozenset
             slope = None
         name, known = quantity.name, slope is not None
         unit, place = quantity.unit, quantity.place
-        assembly.family(Equations("observe", name, name, "observe", unit, place, known, quantity.stored))
+        assembly.family(EquationFamily("observe", name, name, "observe", unit, place, known, quantity.stored))
         for term in split(expression, (), place, read=True):
             assembly.add("observe", name, (), term.loops, term.expression)
             assembly.add("observe_scale", name, (), term.loops, _scale(term.expression))
@@ -100,11 +100,11 @@ def _meters(expression: Node, names: tuple[str, ...]) -> list[Node]:
 
 def pins_and_equations(
     model: EnergyModel, carriers: frozenset[str], families: Sequence[Unknowns]
-) -> tuple[tuple[Pin, ...], tuple[Equation, ...]]:
+) -> tuple[tuple[Pin, ...], tuple[InitialEquation, ...]]:
     """Initial values of unknowns, and the initial conditions that are equations."""
     numbers = {(f.owner, f.kind): k for k, f in enumerate(families)}
     pins: list[Pin] = []
-    equations: list[Equation] = []
+    equations: list[InitialEquation] = []
     for target in model.initials:
         node = target.target
         plain = node.op == "var" and node.data[2] == 0 and not variables(target.value)
@@ -116,16 +116,16 @@ def pins_and_equations(
         told = _unknowns(target)
         if told and all(n.data[1] == model.mirror.coordinate and n.data[:2] not in numbers for n in told):
             continue
-        equations.append(Equation(f"#init {len(equations)}", target))
+        equations.append(InitialEquation(f"#init {len(equations)}", target))
     return tuple(pins), tuple(equations)
 
 
-def _follows(node: Node, target: Target) -> bool:
+def _follows(node: Node, target: InitialTarget) -> bool:
     """Whether an unknown holds nothing of what a store does: its guess moves the state, as that of an expression."""
     return node.data[1] in ("kappa", "mu") or (target.apart and node.data[1] == "f")
 
 
-def missing(equations: Sequence[Equation]) -> Iterator[Unknowns]:
+def missing(equations: Sequence[InitialEquation]) -> Iterator[Unknowns]:
     """What guesses miss: of contents in their unit, of any other expression in one of its own."""
     for owner, target in ((e.owner, e.target) for e in equations if not e.target.fixed):
         kind = "slack" if target.said else "unsaid"
@@ -133,13 +133,13 @@ def missing(equations: Sequence[Equation]) -> Iterator[Unknowns]:
 
 
 def add_initials(
-    assembly: Assembly, model: EnergyModel, carriers: frozenset[str], equations: Sequence[Equation]
+    assembly: Assembly, model: EnergyModel, carriers: frozenset[str], equations: Sequence[InitialEquation]
 ) -> None:
     """One row family an equation, its shape the ranges of its loops; a guess holds but for what it misses."""
     for equation in equations:
         target, owner, content = equation.target, equation.owner, bool(equation.target.store)
         label = target.store or "initial"
-        assembly.family(Equations("initial", label, owner, "initial", target.unit, target.place, content=content))
+        assembly.family(EquationFamily("initial", label, owner, "initial", target.unit, target.place, content=content))
         at = tuple(counter(k) for k in range(len(target.nest)))
         missed = [var(own.owner, own.kind, *at) for own in missing([equation])]
         residual = resolve(model, carriers, sub(target.target, add(target.value, *missed)))

@@ -6,7 +6,7 @@ from collections.abc import Iterator
 
 from sysdyn.compiler.network.primal.balances import MULTIPLIER, ZERO, Balances
 from sysdyn.compiler.network.primal.bounds import Box
-from sysdyn.compiler.network.primal.series import Member, Series
+from sysdyn.compiler.network.primal.series import Series, SeriesMember
 from sysdyn.dsl.model.network import Network
 from sysdyn.values import dataclass
 
@@ -32,7 +32,7 @@ def _displacements(network: Network) -> Iterator[Step]:
 
 
 def _classes(classes: Series) -> Iterator[Step]:
-    members: dict[str, list[Member]] = {}
+    members: dict[str, list[SeriesMember]] = {}
     for m in classes.members:
         members.setdefault(m.coordinate, []).append(m)
     for coordinate in classes.coordinates:

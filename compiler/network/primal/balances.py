@@ -11,11 +11,20 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 
-from sysdyn.compiler.network.primal.bounds import Bound, Box, Interval, box_difference, box_holds, number, parts, union
+from sysdyn.compiler.network.primal.bounds import (
+    Box,
+    Interval,
+    WholeNumber,
+    box_difference,
+    box_holds,
+    number,
+    parts,
+    union,
+)
 from sysdyn.compiler.network.primal.incidence import (
     MINUS,
-    Contact,
-    Element,
+    BranchElement,
+    BranchEnd,
     Incidence,
     NodeCell,
     ground,
@@ -23,7 +32,7 @@ from sysdyn.compiler.network.primal.incidence import (
     loops_over,
     unrolling_error,
 )
-from sysdyn.compiler.network.primal.index_classes import Cell, End, IndexClasses, Link
+from sysdyn.compiler.network.primal.index_classes import Cell, IndexClasses, Link, LinkEnd
 from sysdyn.dsl.model.expression import Node, index, linear, reduction, scale, var
 from sysdyn.dsl.model.network import Constraint
 from sysdyn.values import dataclass
@@ -32,7 +41,7 @@ MULTIPLIER, ZERO, WALK = "multiplier", "zero", "walk"
 
 
 @dataclass(frozen=True, slots=True)
-class Effort:
+class NodeEffort:
     """How the effort of the nodes of a box is read: the multiplier of `label`, zero, or a walk from `cell`.
 
     `ground`: the name of the ground that is not the reference of the component, so that its effort is subtracted.
@@ -51,7 +60,7 @@ class Balances:
     """Node constraints (their flows still those of branches) and how efforts are read."""
 
     constraints: tuple[Constraint, ...]
-    efforts: tuple[Effort, ...]
+    efforts: tuple[NodeEffort, ...]
 
 
 class _Components:
@@ -76,18 +85,18 @@ class _Components:
     def _tie(self, name: str, box: Box) -> Link:
         """Nodes that a table of indices reaches belong together: neighbours do."""
         (whole,) = box
-        one, other = (End(self.number[name], ((0, number(k)),)) for k in (0, 1))
+        one, other = (LinkEnd(self.number[name], ((0, number(k)),)) for k in (0, 1))
         return Link((Interval(whole.first, whole.last.minus(1)),), one, other)
 
-    def _end(self, element: Element, contact: Contact) -> End:
+    def _end(self, element: BranchElement, contact: BranchEnd) -> LinkEnd:
         if contact.node in self.tied:
-            return End(self.number[contact.node], ((None, self.tied[contact.node][0].first),))
-        at: list[tuple[int | None, Bound]] = [
+            return LinkEnd(self.number[contact.node], ((None, self.tied[contact.node][0].first),))
+        at: list[tuple[int | None, WholeNumber]] = [
             (None if a.loop is None else element.loops.index(a.loop), a.offset) for a in contact.at
         ]
-        return End(self.number[contact.node], tuple(at))
+        return LinkEnd(self.number[contact.node], tuple(at))
 
-    def _check_links(self, branches: Sequence[Element], links: Sequence[Link]) -> None:
+    def _check_links(self, branches: Sequence[BranchElement], links: Sequence[Link]) -> None:
         """What could not be followed does no harm where both ends are connected to ground anyway."""
         bad = {link.a for link in self.likeness.refused} | {link.b for link in self.likeness.refused}
         for element, link in zip(branches, links, strict=True):
@@ -110,7 +119,7 @@ def balances(incidence: Incidence, merged: Sequence[NodeCell]) -> Balances:
     components = _Components(incidence)
     known = {id(cell) for cell in merged}
     rows: list[tuple[NodeCell, Box, str | None]] = []
-    still: list[Effort] = []
+    still: list[NodeEffort] = []
     for cells in components.groups():
         held = [(c, node) for c in cells if (node := _node(components, incidence, c)) is not None]
         if not held:
@@ -121,7 +130,7 @@ def balances(incidence: Incidence, merged: Sequence[NodeCell]) -> Balances:
     rows = _merge_boxes(rows)
     labels = parts([(cell.node, box) for cell, box, _ in rows])
     efforts = [
-        Effort(cell.node, box, MULTIPLIER, label.name, cell, gauge)
+        NodeEffort(cell.node, box, MULTIPLIER, label.name, cell, gauge)
         for (cell, box, gauge), label in zip(rows, labels, strict=True)
     ]
     constraints = [row for e in efforts for row in _rows(e, incidence)]
@@ -138,7 +147,7 @@ Held = tuple[Cell, NodeCell]
 
 def _split(
     held: list[Held], components: _Components, merged: set[int]
-) -> tuple[list[tuple[NodeCell, Box, str | None]], list[Effort]]:
+) -> tuple[list[tuple[NodeCell, Box, str | None]], list[NodeEffort]]:
     """Rows of one component, and how the efforts of its other nodes are read."""
     like = components.likeness
     free = [(c, node) for c, node in held if id(node) not in merged]
@@ -148,18 +157,18 @@ def _split(
     corner = _corner(base[0], like)
     gauge = None if earth is None or earth is base else earth[1].node
     rows: list[tuple[NodeCell, Box, str | None]] = []
-    still: list[Effort] = []
+    still: list[NodeEffort] = []
     # the reference has an effort of zero, merged nodes are read along their class, others have a row
     for cell, node in held:
         box = like.box(cell)
         if (cell, node) == base:
-            still.append(Effort(node.node, corner, ZERO, "", node, gauge))
+            still.append(NodeEffort(node.node, corner, ZERO, "", node, gauge))
             if id(node) in merged:
-                still += [Effort(node.node, rest, WALK, "", node, gauge) for rest in box_difference(box, corner)]
+                still += [NodeEffort(node.node, rest, WALK, "", node, gauge) for rest in box_difference(box, corner)]
             else:
                 rows += [(node, rest, gauge) for rest in box_difference(box, corner)]
         elif id(node) in merged:
-            still.append(Effort(node.node, box, WALK, "", node, gauge))
+            still.append(NodeEffort(node.node, box, WALK, "", node, gauge))
         else:
             rows.append((node, box, gauge))
     return rows, still
@@ -188,18 +197,18 @@ def _merge_boxes(rows: list[tuple[NodeCell, Box, str | None]]) -> list[tuple[Nod
     return [(same[0][0], box, gauge) for (_, gauge), same in groups.items() for box in union([box for _, box in same])]
 
 
-def _fewer(efforts: Sequence[Effort]) -> Iterator[Effort]:
+def _fewer(efforts: Sequence[NodeEffort]) -> Iterator[NodeEffort]:
     """Neighbouring boxes that are read alike as one."""
-    groups: dict[tuple[str, str, str, str | None, int], list[Effort]] = {}
+    groups: dict[tuple[str, str, str, str | None, int], list[NodeEffort]] = {}
     for e in efforts:
         key = (e.node, e.how, e.label, e.ground, id(e.cell) if e.how == WALK else 0)
         groups.setdefault(key, []).append(e)
     for same in groups.values():
         for box in union([e.box for e in same]):
-            yield Effort(same[0].node, box, same[0].how, same[0].label, same[0].cell, same[0].ground)
+            yield NodeEffort(same[0].node, box, same[0].how, same[0].label, same[0].cell, same[0].ground)
 
 
-def _rows(effort: Effort, incidence: Incidence) -> Iterator[Constraint]:
+def _rows(effort: NodeEffort, incidence: Incidence) -> Iterator[Constraint]:
     """The sum of flows into each node of the box, and what scattered ends add to it."""
     cell = effort.cell
     yield _row(effort)
@@ -215,7 +224,7 @@ def _rows(effort: Effort, incidence: Incidence) -> Iterator[Constraint]:
         yield Constraint("psi", effort.label, at, flow, loops, unit, cell.place, adds=True)
 
 
-def _row(effort: Effort) -> Constraint:
+def _row(effort: NodeEffort) -> Constraint:
     """The sum of flows into each node of the box from the ends that touch all of them."""
     at = indices(effort.box)
     terms: list[tuple[float, Node]] = []

@@ -19,45 +19,45 @@ from sysdyn.values import dataclass
 
 
 @dataclass(frozen=True, slots=True)
-class Bound:
+class WholeNumber:
     """A whole number: its value with the network's parameters, and its expression."""
 
     value: int
     node: Node
 
-    def plus(self, other: Bound | int) -> Bound:
+    def plus(self, other: WholeNumber | int) -> WholeNumber:
         """The sum."""
         other = number(other) if isinstance(other, int) else other
-        return Bound(self.value + other.value, add(self.node, other.node))
+        return WholeNumber(self.value + other.value, add(self.node, other.node))
 
-    def minus(self, other: Bound | int) -> Bound:
+    def minus(self, other: WholeNumber | int) -> WholeNumber:
         """The difference."""
         other = number(other) if isinstance(other, int) else other
-        return Bound(self.value - other.value, sub(self.node, other.node))
+        return WholeNumber(self.value - other.value, sub(self.node, other.node))
 
 
-def number(value: int) -> Bound:
+def number(value: int) -> WholeNumber:
     """A literal."""
-    return Bound(value, const(value))
+    return WholeNumber(value, const(value))
 
 
 @dataclass(frozen=True, slots=True)
 class Interval:
     """first..last, both included."""
 
-    first: Bound
-    last: Bound
+    first: WholeNumber
+    last: WholeNumber
 
     @property
     def size(self) -> int:
         """How many whole numbers lie in it."""
         return max(self.last.value - self.first.value + 1, 0)
 
-    def plus(self, offset: Bound | int) -> Interval:
+    def plus(self, offset: WholeNumber | int) -> Interval:
         """The interval moved."""
         return Interval(self.first.plus(offset), self.last.plus(offset))
 
-    def minus(self, offset: Bound | int) -> Interval:
+    def minus(self, offset: WholeNumber | int) -> Interval:
         """The interval moved back."""
         return Interval(self.first.minus(offset), self.last.minus(offset))
 
@@ -135,7 +135,7 @@ def _parts_outside(box: Box, hole: Box) -> Iterator[Box]:
                 yield (*inner[:k], part, *box[k + 1 :])
 
 
-def between(cuts: dict[int, Bound]) -> list[Interval]:
+def between(cuts: dict[int, WholeNumber]) -> list[Interval]:
     """The intervals between successive cuts (each cut begins an interval; the last one ends all)."""
     ordered = [cuts[value] for value in sorted(cuts)]
     return [Interval(a, b.minus(1)) for a, b in itertools.pairwise(ordered)]
@@ -146,7 +146,7 @@ class Affine:
     """An index: (loop variable) + offset."""
 
     loop: str | None
-    offset: Bound
+    offset: WholeNumber
 
     def substitute_loops(self, values: dict[str, Node]) -> Node:
         """The index with loop variables replaced."""
@@ -173,7 +173,7 @@ class Picked:
         return None
 
     @property
-    def offset(self) -> Bound:
+    def offset(self) -> WholeNumber:
         """The first that is picked."""
         return number(self.values[0])
 
@@ -189,7 +189,7 @@ class Picked:
         return Interval(number(min(found)), number(max(found)))
 
 
-class Sizes:
+class WholeNumbers:
     """Values of whole-number expressions with a network's own parameter values; only what is asked is computed."""
 
     def __init__(self, network: Network) -> None:
@@ -203,12 +203,12 @@ class Sizes:
             self._found[node] = evaluate([node], self._leaf)[0]
         return self._found[node]
 
-    def bound(self, node: Node, place: Place | None) -> Bound:
+    def bound(self, node: Node, place: Place | None) -> WholeNumber:
         """A whole number; E805 where it is none."""
         value = self.value(node)
         if not abs(value) < 2**31 or value != round(value):
             raise ModelError([Diagnostic("E805", f"{to_text(node)} = {value:g} is no whole number", place)])
-        return Bound(round(value), node)
+        return WholeNumber(round(value), node)
 
     def interval(self, first: Node, last: Node, place: Place | None) -> Interval:
         """first..last."""
@@ -291,14 +291,14 @@ def _indices(node: Node) -> bool:
 
 
 @dataclass(frozen=True, slots=True)
-class Part:
+class FamilyBox:
     """A box of a named family: `name` is unique, `family` the one the author knows."""
 
     name: str
     box: Box
 
 
-def parts(found: Sequence[tuple[str, Box]]) -> list[Part]:
+def parts(found: Sequence[tuple[str, Box]]) -> list[FamilyBox]:
     """For each (family, box) the part it lies in: unions of disjoint boxes that are boxes, each with a name of its own.
 
     The first part of a family keeps the family's name, others are `name.2`, `name.3`, ...
@@ -306,9 +306,9 @@ def parts(found: Sequence[tuple[str, Box]]) -> list[Part]:
     groups: dict[str, list[Box]] = {}
     for family, box in found:
         groups.setdefault(family, []).append(box)
-    hulls: dict[str, list[Part]] = {}
+    hulls: dict[str, list[FamilyBox]] = {}
     for family, boxes in groups.items():
-        hulls[family] = [Part(family if k == 0 else f"{family}.{k + 1}", b) for k, b in enumerate(union(boxes))]
+        hulls[family] = [FamilyBox(family if k == 0 else f"{family}.{k + 1}", b) for k, b in enumerate(union(boxes))]
     return [next(p for p in hulls[family] if box_holds(p.box, box)) for family, box in found]
 
 

@@ -27,7 +27,7 @@ ENERGY = {"kinetic": "T*", "potential": "V", "dissipator": "D"}
 
 
 @dataclass(frozen=True, slots=True)
-class Law:
+class BranchLaw:
     """How a branch enters.
 
     how: energy (stated), work, implicit (stated = 0 closes its effort), state (stated = 0 closes its momentum), row
@@ -57,27 +57,27 @@ class Causality:
         self.letters = letters
         self.kinetic = branch.kind == "kinetic"
 
-    def law(self) -> Law:
+    def law(self) -> BranchLaw:
         """The branch's law."""
         branch = self.branch
         # of statements, or of a coupling
         if branch.kind in ("field", "port"):
-            return Law(branch.kind)
+            return BranchLaw(branch.kind)
         if branch.law is None or branch.side is None:
             raise ModelError([Diagnostic("E409", f"branch {branch.name} has no law", branch.place)])
         # a source of effort does work on its flow
         if branch.kind == "effort":
-            return Law("work", branch.law)
+            return BranchLaw("work", branch.law)
         # a source of flow is a constraint, of other unknowns a gamma
         if branch.kind == "flow":
             outer = [n for n in variables(branch.law) if n.op == "var" and n.data[1] != "s"]
-            return Law("implicit" if outer else "row", sub(own(branch, "bf"), branch.law))
+            return BranchLaw("implicit" if outer else "row", sub(own(branch, "bf"), branch.law))
         # given by the variable that Lagrange's form wants: as it is, unless it is solved for an implicit one
         if branch.side == OWN[branch.kind][1]:
             return self._inside_out(branch.law) or self._explicit(branch.law)
         return self._invert_law(branch.law)
 
-    def _inside_out(self, law: Node) -> Law | None:
+    def _inside_out(self, law: Node) -> BranchLaw | None:
         """A dissipator's e(f) with a logarithm, as f(e) with an implicit effort: where the domain ends, f is nearly
         constant, and doubles no longer hold e.
         """
@@ -89,27 +89,27 @@ class Causality:
         if found is None or not self._rest_on(found.rests):
             return None
         said = f"{self._side(branch.side)} of {branch.name} stays implicit: its law is not defined everywhere"
-        return Law("implicit", sub(v, found.expression), (("N604", said),), found.tables)
+        return BranchLaw("implicit", sub(v, found.expression), (("N604", said),), found.tables)
 
-    def _explicit(self, law: Node, notes: Notes = (), tables: tuple[Table, ...] = ()) -> Law:
+    def _explicit(self, law: Node, notes: Notes = (), tables: tuple[Table, ...] = ()) -> BranchLaw:
         """A law of the branch's own variable."""
         branch, kinetic = self.branch, self.kinetic
         v, pseudo = own(branch, OWN[branch.kind][0]), branch.domain.pseudo
         stated = sub(conjugate(branch), law)
         if kinetic and (pseudo or self.effort_read or variables(law) - {v}):
-            return Law("state", stated, notes, tables, self._stored_energy(law, v))
+            return BranchLaw("state", stated, notes, tables, self._stored_energy(law, v))
         alone = not pseudo and not variables(law) - {v}
         energy = self._energy(law, v) if alone else None
         if energy is not None:
-            return Law("energy", energy, notes, tables)
+            return BranchLaw("energy", energy, notes, tables)
         if kinetic:
             text = f"the {self._kept} of {branch.name} is kept as a state: its law has no closed integral"
             kept = self._stored_energy(law, v) if law is branch.law else None
-            return Law("state", stated, (*notes, ("N604", text)), tables, kept)
+            return BranchLaw("state", stated, (*notes, ("N604", text)), tables, kept)
         kept = self._energy(law, v, valued=True) if alone and branch.kind == "potential" else None
         if branch.kind == "potential" and kept is None and not pseudo and not branch.stated:
             notes = (*notes, ("N604", f"the energy of {branch.name} is counted as the integral of its power"))
-        return Law("work", law, notes, tables, kept)
+        return BranchLaw("work", law, notes, tables, kept)
 
     def _energy(self, law: Node, v: Node, *, valued: bool = False) -> Node | None:
         """The integral of a law; of dissipators that of polynomials only: works say theirs as well.
@@ -135,7 +135,7 @@ class Causality:
             return energy
         return sub(energy, substitute(energy, {v: origin}))
 
-    def functions(self, law: Law) -> dict[str, Node]:
+    def functions(self, law: BranchLaw) -> dict[str, Node]:
         """State functions of a store or dissipator, of both variables of its edge, as far as they are closed; each
         adds up to the product of the two with its Legendre transform.
         """
@@ -166,7 +166,7 @@ class Causality:
             self.slopes.rest_on(self.branch, node, sign)
         return True
 
-    def _invert_law(self, law: Node) -> Law:
+    def _invert_law(self, law: Node) -> BranchLaw:
         """A law of the conjugate variable: inverted, or implicit."""
         branch, kinetic = self.branch, self.kinetic
         v, given = own(branch, OWN[branch.kind][0]), conjugate(branch)
@@ -185,7 +185,7 @@ class Causality:
                 return tried
         text = f"{self._side(branch.side)}({self._side(given.data[1][1])}) of {branch.name} stays implicit"
         kept = self._stored_energy(law, given)
-        return Law("state" if kinetic else "implicit", sub(v, law), (("N604", text),), kept=kept)
+        return BranchLaw("state" if kinetic else "implicit", sub(v, law), (("N604", text),), kept=kept)
 
     def _reads_only(self, law: Node, given: Node) -> bool:
         """Whether a law reads `given` alone and nothing that events assign: values at the start decide no form then."""
@@ -217,12 +217,12 @@ class Causality:
     def _kept(self) -> str:
         return {"p": "momentum", "q": "displacement"}[self._side("p")]
 
-    def _constant_law(self, value: Node) -> Law:
+    def _constant_law(self, value: Node) -> BranchLaw:
         """A law without slope: v = value, a constant content has no flow."""
         branch = self.branch
         text = f"{self._side(branch.side)} of {branch.name} is held: its law has no slope"
         rate = const(0.0) if branch.kind == "potential" else value
-        return Law("row", sub(own(branch, "bf"), rate), (("N604", text),))
+        return BranchLaw("row", sub(own(branch, "bf"), rate), (("N604", text),))
 
 
 def conjugate(branch: Branch) -> Node:

@@ -18,12 +18,12 @@ from collections.abc import Container, Iterable, Iterator, Sequence
 from dataclasses import replace
 
 from sysdyn.compiler.network.primal import overlaps
-from sysdyn.compiler.network.primal.bounds import Box, Interval, Sizes, box_difference, box_size, shape_of, union
+from sysdyn.compiler.network.primal.bounds import Box, Interval, WholeNumbers, box_difference, box_size, shape_of, union
 from sysdyn.compiler.network.primal.choices import own
 from sysdyn.compiler.network.primal.cycles import in_loops
 from sysdyn.compiler.network.primal.incidence import (
     PLUS,
-    Element,
+    BranchElement,
     Incidence,
     NodeCell,
     Touch,
@@ -36,7 +36,7 @@ from sysdyn.compiler.network.primal.integrals import line
 from sysdyn.compiler.network.primal.laws import Laws
 from sysdyn.compiler.network.primal.overlaps import initially, inside, meeting, ranges_of, restrict_loops, untold
 from sysdyn.compiler.network.primal.reading import Ranges, Rewriter, touches_network
-from sysdyn.compiler.network.primal.series import Member
+from sysdyn.compiler.network.primal.series import SeriesMember
 from sysdyn.dsl.model.expression import (
     Node,
     const,
@@ -50,7 +50,7 @@ from sysdyn.dsl.model.expression import (
     var,
     variables,
 )
-from sysdyn.dsl.model.network import Branch, Dynamic, Initial, Loop, Network, Parameter, State
+from sysdyn.dsl.model.network import Branch, Dynamic, InitialCondition, Loop, Network, Parameter, State
 
 TELLING = {"potential": ("be", "bq"), "kinetic": ("bf", "bp")}
 """What tells what a store holds: by its law its effort or flow, and its displacement or momentum itself."""
@@ -72,8 +72,8 @@ def held_at(branch: Branch, kind: str, value: Node) -> Node | None:
 
 
 def contents_by_text(
-    b: Branch, initials: Iterable[Initial], sizes: Sizes
-) -> Iterator[tuple[Initial, tuple[Loop, ...], Node]]:
+    b: Branch, initials: Iterable[InitialCondition], sizes: WholeNumbers
+) -> Iterator[tuple[InitialCondition, tuple[Loop, ...], Node]]:
     """Of statements about a branch those that tell what elements of it hold, the loops over these, what they hold."""
     within = ranges_of(b.loops, sizes, b.place)
     for initial in initials:
@@ -85,7 +85,7 @@ def contents_by_text(
 
 def at_stores(
     network: Network, said: Laws, incidence: Incidence, reader: Rewriter, *, reflected: bool
-) -> Iterator[Initial]:
+) -> Iterator[InitialCondition]:
     """Initial conditions; efforts of potential stores, and of nodes that a linear one holds to ground, as contents, but
     for those that hold the same at any effort; fixed efforts that are unknowns as efforts too, for at the start the
     store may hold nothing.
@@ -104,7 +104,7 @@ def at_stores(
         yield from _as_content(replace(initial, apart=apart and not initial.fixed), said, reader)
 
 
-def _as_content(initial: Initial, said: Laws, reader: Rewriter) -> Iterator[Initial]:
+def _as_content(initial: InitialCondition, said: Laws, reader: Rewriter) -> Iterator[InitialCondition]:
     """Where a law tells it, what the store holds at the effort."""
     target = initial.target
     # what is said of anything but an effort, by a number
@@ -131,7 +131,7 @@ def _as_content(initial: Initial, said: Laws, reader: Rewriter) -> Iterator[Init
             yield replace(initial, loops=loops)
 
 
-def _at_store(initial: Initial, cells: Sequence[NodeCell], reader: Rewriter) -> Iterator[Initial]:
+def _at_store(initial: InitialCondition, cells: Sequence[NodeCell], reader: Rewriter) -> Iterator[InitialCondition]:
     """Initial efforts of nodes as those of stores between the node and ground, element by element."""
     node = initial.target
 
@@ -177,9 +177,9 @@ class Contents:
     def __init__(
         self,
         reader: Rewriter,
-        members: Sequence[Member],
-        initials: Sequence[Initial],
-        elements: Sequence[Element],
+        members: Sequence[SeriesMember],
+        initials: Sequence[InitialCondition],
+        elements: Sequence[BranchElement],
         *,
         reflected: bool,
         read: frozenset[str] = frozenset(),
@@ -198,9 +198,9 @@ class Contents:
         self.parameters: list[Parameter] = []
         self.states: list[State] = []
         self.dynamics: list[Dynamic] = []
-        self._given: dict[str, list[tuple[Initial, Box]]] = {}
+        self._given: dict[str, list[tuple[InitialCondition, Box]]] = {}
         self._stems: list[str] = []
-        self._led: dict[int, Element] = {}  # followers that are no stores: what they begin at is no guess
+        self._led: dict[int, BranchElement] = {}  # followers that are no stores: what they begin at is no guess
         kinetic = {e.name for e in elements if e.branch.kind == "kinetic"}
         self._loose = any(  # what is said of others may ask for contents
             not _is_content(i) and not _of_momenta(i, kinetic) for i in initials
@@ -210,7 +210,7 @@ class Contents:
             within = ranges_of(initial.loops, reader.sizes, initial.place)
             box = reader.sizes.reach(initial.target.args, within, initial.place)
             self._given.setdefault(initial.target.data[0], []).append((initial, box))
-        followers: dict[int, list[Member]] = {}
+        followers: dict[int, list[SeriesMember]] = {}
         begin = [m for m in members if m.element.branch.kind == "potential" or m.element.name in {*read, *self._given}]
         alike: dict[str, set[int]] = {}
         # members of one coordinate: the first leads, others follow from it
@@ -232,7 +232,7 @@ class Contents:
         given = [initial for initial, _ in self._given.get(name, ())]
         return initially(given, at, within, self.reader.sizes) or const(0.0)
 
-    def _follower(self, element: Element, members: Sequence[Member]) -> None:
+    def _follower(self, element: BranchElement, members: Sequence[SeriesMember]) -> None:
         """The constant of stores in series with others, unless it is zero by the text."""
         at, whole = indices(element.named), ranges_over(element.named)
         value: Node = const(0.0)
@@ -246,7 +246,7 @@ class Contents:
         fixed = all(self._is_fixed(element, m.box) and self._is_fixed(m.leader, _led_by(m)) for m in members)
         self._constant(element, value if fixed or not sought else None)
 
-    def _constant(self, element: Element, value: Node | None) -> None:
+    def _constant(self, element: BranchElement, value: Node | None) -> None:
         """A parameter of that value over the element's indices, none for zero; chosen by the start where None."""
         if value is not None and is_const(value, 0.0):
             return
@@ -262,14 +262,14 @@ class Contents:
             self.states.append(State(name, shape, unit, place))
             self.dynamics.append(Dynamic(var(name, "s", *indices(box)), const(0.0), loops_over(box), place))
 
-    def _is_fixed(self, element: Element, box: Box) -> bool:
+    def _is_fixed(self, element: BranchElement, box: Box) -> bool:
         """Whether the text fixes the contents of all these elements; of what is no store it does, if only at zero."""
         given = self._given.get(element.name, ())
         return element.branch.kind != "potential" or not box_difference(box, *(said for i, said in given if i.fixed))
 
     # -- initial conditions -------------------------------------------------------------------------------------
 
-    def initial_conditions(self, measured: Container[str]) -> Iterator[Initial]:
+    def initial_conditions(self, measured: Container[str]) -> Iterator[InitialCondition]:
         """The initial conditions of coordinates and other unknowns; measured: stores whose guesses stand elsewhere."""
         known: set[tuple[Node, Node, tuple[Loop, ...], bool]] = set()
         for initial in (*self.initials, *self._follower_initials()):
@@ -296,16 +296,16 @@ class Contents:
                     known.add(said)
                     yield replace(initial, target=target, value=value, loops=own)
 
-    def _follower_initials(self) -> Iterator[Initial]:
+    def _follower_initials(self) -> Iterator[InitialCondition]:
         """What followers that are no stores begin at."""
         for e in self._led.values():
             b, given = e.branch, [initial for initial, _ in self._given.get(e.name, ())]
             within = ranges_of(b.loops, self.reader.sizes, b.place)
-            zero = Initial(var(e.name, "bq", *b.at), const(0.0), True, b.loops, b.place, said=False)
+            zero = InitialCondition(var(e.name, "bq", *b.at), const(0.0), True, b.loops, b.place, said=False)
             for ranges in untold(given, b.at, within, self.reader.sizes):
                 yield replace(zero, loops=restrict_loops(b.loops, ranges))
 
-    def _one(self, initial: Initial, ranges: Ranges) -> tuple[Node, Node] | None:
+    def _one(self, initial: InitialCondition, ranges: Ranges) -> tuple[Node, Node] | None:
         """Where one piece is read: target and value; of stores whose constant is told the coordinate of their class;
         None where a constant says it.
         """
@@ -325,12 +325,12 @@ class Contents:
         return (new, value) if variables(value) else _pin(new, value)
 
 
-def _is_content(initial: Initial) -> bool:
+def _is_content(initial: InitialCondition) -> bool:
     """Whether a statement tells a displacement of a branch by itself."""
     return initial.target.op == "var" and initial.target.data[1:] == ("bq", 0) and not variables(initial.value)
 
 
-def _of_momenta(initial: Initial, kinetic: Container[str]) -> bool:
+def _of_momenta(initial: InitialCondition, kinetic: Container[str]) -> bool:
     """Whether a statement tells the flow or the momentum of a node, or of one of these branches, by itself."""
     target = initial.target
     plain = target.op == "var" and not target.data[2] and not variables(initial.value)
@@ -347,7 +347,7 @@ def _pin(target: Node, value: Node) -> tuple[Node, Node]:
     return target, value
 
 
-def _led_by(m: Member) -> Box:
+def _led_by(m: SeriesMember) -> Box:
     """The elements of the leader that a member follows."""
     pairs = ((None if k is None else m.box[k], c) for k, c in m.leader_index)
     return tuple(Interval(c, c) if i is None else i.plus(c) for i, c in pairs)

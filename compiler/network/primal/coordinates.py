@@ -14,17 +14,17 @@ from typing import Any
 
 from sysdyn.compiler.network.primal.account import Step, account
 from sysdyn.compiler.network.primal.balances import balances
-from sysdyn.compiler.network.primal.bounds import Sizes
+from sysdyn.compiler.network.primal.bounds import WholeNumbers
 from sysdyn.compiler.network.primal.contents import Contents, at_stores
-from sysdyn.compiler.network.primal.incidence import Element, Incidence
+from sysdyn.compiler.network.primal.incidence import BranchElement, Incidence
 from sysdyn.compiler.network.primal.laws import Laws, laws
 from sysdyn.compiler.network.primal.potentials import Potentials
 from sysdyn.compiler.network.primal.precedence import foremost
 from sysdyn.compiler.network.primal.reading import EliminationTable, IndexBox, Rewriter
 from sysdyn.compiler.network.primal.series import Series, series
-from sysdyn.compiler.network.primal.unspecified import guess_contents
+from sysdyn.compiler.network.primal.store_guesses import guess_contents
 from sysdyn.dsl.model.expression import Node, variables
-from sysdyn.dsl.model.network import Constraint, Coordinate, Dynamic, Energy, Expectation, Network, Work
+from sysdyn.dsl.model.network import Constraint, Coordinate, Dynamic, EnergyTerm, Expectation, Network, VirtualWork
 from sysdyn.dsl.model.rewriting import EXPRESSIONS, expressions
 from sysdyn.dsl.text.diagnostics import Diagnostic, ModelError, Place
 
@@ -35,7 +35,7 @@ def primal(network: Network, *, reflected: bool = False) -> tuple[Network, tuple
     """
     if not network.branches and not network.nodes:
         return network, (), ()
-    sizes = Sizes(network)
+    sizes = WholeNumbers(network)
     # which elements end where, and which flows are equal
     incidence = Incidence(network, sizes)
     classes = series(incidence, network.read)
@@ -90,7 +90,7 @@ def _sticking(network: Network) -> dict[str, tuple[str, ...]]:
     return found
 
 
-def _pieces(elements: tuple[Element, ...], classes: Series) -> dict[str, list[IndexBox]]:
+def _pieces(elements: tuple[BranchElement, ...], classes: Series) -> dict[str, list[IndexBox]]:
     """How each branch family is cut: by its statements, and by the classes these belong to."""
     found: dict[str, list[IndexBox]] = {}
     cut = {m.element.number for m in classes.members}
@@ -129,12 +129,12 @@ def _statements(network: Network, said: Laws, nodes: tuple[Constraint, ...], rea
     }
 
 
-def _energy(e: Energy, reader: Rewriter) -> Iterator[Energy]:
+def _energy(e: EnergyTerm, reader: Rewriter) -> Iterator[EnergyTerm]:
     for loops, (expression,) in reader.statement(e.loops, (e.expression,), e.place):
         yield replace(e, expression=_still(expression, e.expression, e.place), loops=loops)
 
 
-def _work(w: Work, reader: Rewriter) -> Iterator[Work]:
+def _work(w: VirtualWork, reader: Rewriter) -> Iterator[VirtualWork]:
     for loops, (effort, on) in reader.statement(w.loops, (w.effort, w.on), w.place):
         yield replace(w, effort=_still(effort, w.effort, w.place), on=on, loops=loops)
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from sysdyn.dsl.model.joined import Joined
+from sysdyn.dsl.model.connected_components import Joined
 
 
 def in_loops(branches: Sequence[tuple[str, str, int]]) -> frozenset[int]:

@@ -11,7 +11,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 
 from sysdyn.compiler.model.terms import counter, terms
-from sysdyn.compiler.network.primal.incidence import Element
+from sysdyn.compiler.network.primal.incidence import BranchElement
 from sysdyn.dsl.model.calculus import derivative, time_derivative
 from sysdyn.dsl.model.expression import (
     Node,
@@ -35,7 +35,7 @@ from sysdyn.values import dataclass
 
 
 @dataclass(frozen=True, slots=True)
-class _Slope:
+class _ElementSlope:
     """The derivative of a statement by one element of a branch family, over the statement's loops."""
 
     at: tuple[Node, ...]
@@ -43,7 +43,7 @@ class _Slope:
     loops: tuple[Loop, ...]
 
 
-def field_quantities(network: Network, elements: Sequence[Element]) -> tuple[dict[int, Node], dict[int, Node]]:
+def field_quantities(network: Network, elements: Sequence[BranchElement]) -> tuple[dict[int, Node], dict[int, Node]]:
     """Efforts and momenta by element number, over the element's loops."""
     fields = [e for e in elements if e.branch.kind == "field"]
     efforts: dict[int, Node] = {}
@@ -61,10 +61,10 @@ def field_quantities(network: Network, elements: Sequence[Element]) -> tuple[dic
     return efforts, momenta
 
 
-def _slopes(network: Network, name: str) -> tuple[list[_Slope], list[_Slope]]:
+def _slopes(network: Network, name: str) -> tuple[list[_ElementSlope], list[_ElementSlope]]:
     """What makes the effort, and what makes the momentum, of the branches of a family."""
-    efforts: list[_Slope] = []
-    momenta: list[_Slope] = []
+    efforts: list[_ElementSlope] = []
+    momenta: list[_ElementSlope] = []
     # e = dV/dq - dT*/dq + dD/df, p = dT*/df
     for energy in network.energies:
         sign = {"V": 1.0, "T": 1.0, "T*": -1.0}.get(energy.function)
@@ -88,7 +88,7 @@ def _slopes(network: Network, name: str) -> tuple[list[_Slope], list[_Slope]]:
 
 def _slopes_by(
     root: Node, loops: tuple[Loop, ...], place: Place, wanted: tuple[str, str], factor: Node
-) -> Iterator[_Slope]:
+) -> Iterator[_ElementSlope]:
     """Factor times the derivative of a statement by each reference to the branch that it holds."""
     if not any(n.op == "var" and n.data == (*wanted, 0) for n in variables(root)):
         return
@@ -97,10 +97,10 @@ def _slopes_by(
         for node in sorted((n for n in variables(term.expression) if n.op == "var"), key=lambda n: n.number):
             slope = derivative(term.expression, node) if node.data == (*wanted, 0) else const(0.0)
             if not is_const(slope, 0.0):
-                yield _Slope(node.args, mul(substitute(factor, change), slope), term.loops)
+                yield _ElementSlope(node.args, mul(substitute(factor, change), slope), term.loops)
 
 
-def _slope_of_element(found: _Slope, wanted: tuple[Node, ...], own: tuple[Loop, ...]) -> Node:
+def _slope_of_element(found: _ElementSlope, wanted: tuple[Node, ...], own: tuple[Loop, ...]) -> Node:
     """The slope for one element: an index that is a loop variable over the branch's own range takes its place."""
     change: dict[Node, Node] = {}
     ranges = {index(loop.index): (loop.first, loop.last) for loop in own}

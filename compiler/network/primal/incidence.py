@@ -2,7 +2,7 @@
 
 A node family is cut where the reach of a terminal begins or ends; in each box so made every node is touched by the same
 branches, so its degree is known (language, 8.5).  A family that terminals reach by a table of indices is one cell; such
-families are connected in themselves (`gathered.py`).  A domain's ground is a node without indices.
+families are connected in themselves (`alike_elements.py`).  A domain's ground is a node without indices.
 """
 
 from __future__ import annotations
@@ -12,11 +12,11 @@ from collections.abc import Iterator
 
 from sysdyn.compiler.network.primal.bounds import (
     Affine,
-    Bound,
     Box,
     Interval,
     Picked,
-    Sizes,
+    WholeNumber,
+    WholeNumbers,
     between,
     box_holds,
     box_size,
@@ -30,7 +30,7 @@ PLUS, MINUS = 0, 1
 
 
 @dataclass(frozen=True, slots=True)
-class Contact:
+class BranchEnd:
     """One end of a branch at a node: the flow leaves the node at plus and enters it at minus."""
 
     node: str  # family, or the ground's name
@@ -38,7 +38,7 @@ class Contact:
 
 
 @dataclass(frozen=True, slots=True)
-class Element:
+class BranchElement:
     """A branch statement: ranges of its loops, indices of its name, contacts (none where it stands `on`)."""
 
     number: int
@@ -46,7 +46,7 @@ class Element:
     loops: tuple[str, ...]
     box: Box
     at: tuple[Affine, ...]
-    ends: tuple[Contact, ...]
+    ends: tuple[BranchEnd, ...]
 
     @property
     def name(self) -> str:
@@ -77,12 +77,12 @@ class Element:
 class Touch:
     """A branch end that touches every node of a cell; `free`: loop variables along which many branches touch it."""
 
-    element: Element
+    element: BranchElement
     end: int
     free: tuple[str, ...]
 
     @property
-    def contact(self) -> Contact:
+    def contact(self) -> BranchEnd:
         """Its terminal."""
         return self.element.ends[self.end]
 
@@ -101,7 +101,7 @@ class NodeCell:
     box: Box
     touches: tuple[Touch, ...]
     place: Place
-    scattered: tuple[tuple[Element, int], ...] = ()
+    scattered: tuple[tuple[BranchElement, int], ...] = ()
 
     @property
     def degree(self) -> int:
@@ -116,12 +116,12 @@ def ground(domain: Domain) -> str:
     return f"#ground {domain.name}"
 
 
-def elements(network: Network, sizes: Sizes) -> tuple[Element, ...]:
+def elements(network: Network, sizes: WholeNumbers) -> tuple[BranchElement, ...]:
     """All branches with at least one element, in the order of the text."""
     return tuple(e for k, b in enumerate(network.branches) for e in _element(k, b, sizes))
 
 
-def _element(number: int, branch: Branch, sizes: Sizes) -> Iterator[Element]:
+def _element(number: int, branch: Branch, sizes: WholeNumbers) -> Iterator[BranchElement]:
     """A branch as a box of elements with ends, none of an empty range; E806 of ranges or indices that boxes cannot
     hold.
     """
@@ -141,20 +141,20 @@ def _element(number: int, branch: Branch, sizes: Sizes) -> Iterator[Element]:
     for name in loops:
         if sum(a.loop == name for a in at) != 1:
             raise unrolling_error(f"{branch.name} is not indexed once by {name}", branch.place)
-    ends: tuple[Contact, ...] = ()
+    ends: tuple[BranchEnd, ...] = ()
     if branch.on is None:
         pair = (branch.plus, branch.minus)
         ends = tuple(_contact(t, branch, loops, sizes) for t in pair if t is not None)
-    yield Element(number, branch, loops, box, at, ends)
+    yield BranchElement(number, branch, loops, box, at, ends)
 
 
-def _contact(terminal: Terminal, branch: Branch, loops: tuple[str, ...], sizes: Sizes) -> Contact:
+def _contact(terminal: Terminal, branch: Branch, loops: tuple[str, ...], sizes: WholeNumbers) -> BranchEnd:
     name = ground(branch.domain) if terminal.node is None else terminal.node
     at = tuple(sizes.index(node, loops, branch.place) for node in terminal.at)
     used = [a.loop for a in at if a.loop is not None]
     if len(used) != len(set(used)):
         raise unrolling_error(f"{branch.name} meets node {name} along a diagonal", branch.place)
-    return Contact(name, at)
+    return BranchEnd(name, at)
 
 
 def unrolling_error(what: str, place: Place | None) -> ModelError:
@@ -165,13 +165,13 @@ def unrolling_error(what: str, place: Place | None) -> ModelError:
 class Incidence:
     """The common-effort nodes of a network in cells."""
 
-    def __init__(self, network: Network, sizes: Sizes) -> None:
+    def __init__(self, network: Network, sizes: WholeNumbers) -> None:
         self.elements = elements(network, sizes)
         self.families = {n.name: n for n in network.nodes}
         self.boxes: dict[str, Box] = {}
         self.cells: dict[str, tuple[NodeCell, ...]] = {}
         self.sizes = sizes
-        self._contacts: dict[str, list[tuple[Element, int, Contact]]] = {}
+        self._contacts: dict[str, list[tuple[BranchElement, int, BranchEnd]]] = {}
         # ends by node
         for e in self.elements:
             for k, c in enumerate(e.ends):
@@ -201,7 +201,7 @@ class Incidence:
         sides: list[list[Interval]] = []
         # cuts along each dimension where an element begins or ends
         for d, whole in enumerate(box):
-            cuts: dict[int, Bound] = {}
+            cuts: dict[int, WholeNumber] = {}
             for interval in (whole, *(reach[d] for _, _, reach in reaches)):
                 for cut in (interval.first, interval.last.plus(1)):
                     cuts.setdefault(cut.value, cut)
@@ -219,7 +219,7 @@ class Incidence:
         return (cell for cells in self.cells.values() for cell in cells)
 
 
-def _touch(element: Element, end: int) -> Touch:
+def _touch(element: BranchElement, end: int) -> Touch:
     used = {a.loop for a in element.ends[end].at}
     return Touch(element, end, tuple(name for name in element.loops if name not in used))
 

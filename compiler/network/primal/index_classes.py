@@ -16,20 +16,20 @@ import itertools
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import replace
 
-from sysdyn.compiler.network.primal.bounds import Bound, Box, Interval, between, number
+from sysdyn.compiler.network.primal.bounds import Box, Interval, WholeNumber, between, number
 from sysdyn.values import dataclass
 
 Key = tuple[int, int]  # item, dimension
-Cut = tuple[int, int, Bound]  # item, dimension, first index behind the cut
+Cut = tuple[int, int, WholeNumber]  # item, dimension, first index behind the cut
 Cell = tuple[int, tuple[int, ...]]  # item, interval number on the axis of each dimension
 
 
 @dataclass(frozen=True, slots=True)
-class End:
+class LinkEnd:
     """Element of an item: each index is a link index (its number) plus an offset, or the offset alone (None)."""
 
     item: int
-    at: tuple[tuple[int | None, Bound], ...]
+    at: tuple[tuple[int | None, WholeNumber], ...]
 
 
 @dataclass(frozen=True, slots=True)
@@ -37,8 +37,8 @@ class Link:
     """a(k) and b(k) belong together for every k of the box, with equal (+1) or opposite (-1) sense."""
 
     box: Box
-    a: End
-    b: End
+    a: LinkEnd
+    b: LinkEnd
     sign: int = 1
 
 
@@ -63,7 +63,7 @@ class IndexClasses:
     def __init__(self, items: Sequence[Box], links: Sequence[Link], cuts: Iterable[Cut] = ()) -> None:
         self.items = items
         self.refused: list[Link] = []
-        self._aligned: dict[Key, tuple[Key, Bound]] = {}
+        self._aligned: dict[Key, tuple[Key, WholeNumber]] = {}
         self._parent: dict[Cell, tuple[Cell, int]] = {}
         self._collapsed: set[tuple[Cell, Key, int]] = set()
         kept = [link for link in map(_without_points, links) if self._align(link)]
@@ -73,7 +73,7 @@ class IndexClasses:
 
     # -- axes ---------------------------------------------------------------------------------------------------
 
-    def axis(self, item: int, dimension: int) -> tuple[Key, Bound]:
+    def axis(self, item: int, dimension: int) -> tuple[Key, WholeNumber]:
         """The axis of an item's index and the offset: u = x + offset."""
         key, offset = (item, dimension), number(0)
         while key in self._aligned:
@@ -116,9 +116,9 @@ class IndexClasses:
 
     def _cut(self, links: Sequence[Link], cuts: Iterable[Cut]) -> dict[Key, list[Interval]]:
         """Intervals of each axis between all ends of items, links and cuts that are asked for."""
-        found: dict[Key, dict[int, Bound]] = {}
+        found: dict[Key, dict[int, WholeNumber]] = {}
 
-        def add(axis: Key, first: Bound, behind: Bound) -> None:
+        def add(axis: Key, first: WholeNumber, behind: WholeNumber) -> None:
             found.setdefault(axis, {}).setdefault(first.value, first)
             found[axis].setdefault(behind.value, behind)
 
@@ -260,7 +260,7 @@ class IndexClasses:
     def _choices(self, link: Link) -> Iterator[tuple[Option, ...]]:
         return itertools.product(*(self._options(link, k) for k in range(len(link.box))))
 
-    def _places(self, link: Link, k: int) -> list[tuple[int, Key, Bound]]:
+    def _places(self, link: Link, k: int) -> list[tuple[int, Key, WholeNumber]]:
         """The ends that move with link index k, their axes, and u - k there."""
         ends = ((n, d, own) for n, end in enumerate((link.a, link.b)) for d, (i, own) in enumerate(end.at) if i == k)
         found = ((n, own, self.axis((link.a, link.b)[n].item, d)) for n, d, own in ends)
@@ -293,7 +293,7 @@ class IndexClasses:
     def _ends(self, link: Link, choice: tuple[Option, ...]) -> tuple[Cell, Cell]:
         return self._cell(link.a, [o.a for o in choice]), self._cell(link.b, [o.b for o in choice])
 
-    def _cell(self, end: End, chosen: list[int]) -> Cell:
+    def _cell(self, end: LinkEnd, chosen: list[int]) -> Cell:
         at = []
         for d, (index, own) in enumerate(end.at):
             axis, offset = self.axis(end.item, d)
@@ -305,7 +305,7 @@ def _without_points(link: Link) -> Link:
     """Indices of the link that take one value only as constants."""
     points = {k: i.first for k, i in enumerate(link.box) if i.size == 1}
 
-    def at_point(end: End) -> End:
-        return End(end.item, tuple((None, points[k].plus(c)) if k in points else (k, c) for k, c in end.at))
+    def at_point(end: LinkEnd) -> LinkEnd:
+        return LinkEnd(end.item, tuple((None, points[k].plus(c)) if k in points else (k, c) for k, c in end.at))
 
     return replace(link, a=at_point(link.a), b=at_point(link.b))

@@ -235,9 +235,9 @@ def _core(law: Node, v: Node, w: Node, signs: Mapping[Node, int], found: _Found)
     # defined without gaps
     if not _on_an_interval(branch, v, known):
         return None
-    from sysdyn.compiler.network.primal.symbolic import Algebra
+    from sysdyn.compiler.network.primal.symbolic import SignedAlgebra
 
-    slope, algebra = derivative(branch, v), Algebra(v, y, used, positive=odd)
+    slope, algebra = derivative(branch, v), SignedAlgebra(v, y, used, positive=odd)
     # monotone: its slope has one sign, perhaps after simplification
     if reals(slope, known).sign == 0:
         simple = algebra.simplify(slope)

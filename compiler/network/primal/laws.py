@@ -17,10 +17,10 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from dataclasses import field, replace
 
-from sysdyn.compiler.network.primal.bounds import Affine, Part, Sizes, box_holds, parts, shape_of
-from sysdyn.compiler.network.primal.choices import ENERGY, OWN, Causality, Law, conjugate, own
+from sysdyn.compiler.network.primal.bounds import Affine, FamilyBox, WholeNumbers, box_holds, parts, shape_of
+from sysdyn.compiler.network.primal.choices import ENERGY, OWN, BranchLaw, Causality, conjugate, own
 from sysdyn.compiler.network.primal.fields import field_quantities
-from sysdyn.compiler.network.primal.incidence import Element
+from sysdyn.compiler.network.primal.incidence import BranchElement
 from sysdyn.compiler.network.primal.reading import FUNCTIONS
 from sysdyn.compiler.network.primal.slopes import Slopes
 from sysdyn.dsl.model.calculus import derivative, time_derivative
@@ -43,14 +43,14 @@ from sysdyn.dsl.model.network import (
     Constraint,
     Coupling,
     Dynamic,
-    Energy,
-    Initial,
+    EnergyTerm,
+    InitialCondition,
     Network,
     Slope,
     State,
     Table,
     Unknown,
-    Work,
+    VirtualWork,
 )
 from sysdyn.dsl.model.paynter import STATE_FUNCTIONS
 from sysdyn.dsl.model.rewriting import EXPRESSIONS, expressions
@@ -67,8 +67,8 @@ class Laws:
     functions of branches, over the element's own loops.
     """
 
-    energies: list[Energy] = field(default_factory=list)
-    works: list[Work] = field(default_factory=list)
+    energies: list[EnergyTerm] = field(default_factory=list)
+    works: list[VirtualWork] = field(default_factory=list)
     constraints: list[Constraint] = field(default_factory=list)
     dynamics: list[Dynamic] = field(default_factory=list)
     unknowns: dict[str, Unknown] = field(default_factory=dict)
@@ -76,7 +76,7 @@ class Laws:
     efforts: dict[int, Node] = field(default_factory=dict)
     momenta: dict[int, Node] = field(default_factory=dict)
     notes: list[Diagnostic] = field(default_factory=list)
-    initials: list[Initial] = field(default_factory=list)
+    initials: list[InitialCondition] = field(default_factory=list)
     functions: dict[int, dict[str, Node]] = field(default_factory=dict)
     slopes: tuple[Slope, ...] = ()
     constant: set[Branch] = field(default_factory=set)  # what they hold is the same whatever their effort
@@ -84,7 +84,7 @@ class Laws:
     tables: dict[str, Table] = field(default_factory=dict)
 
 
-def laws(network: Network, elements: Sequence[Element], sizes: Sizes, *, reflected: bool = False) -> Laws:
+def laws(network: Network, elements: Sequence[BranchElement], sizes: WholeNumbers, *, reflected: bool = False) -> Laws:
     """All laws; reflected: the network is the reflection of the author's, whose letters notes are to say."""
     wanted = _read_efforts(network)
     found = Laws()
@@ -97,7 +97,7 @@ def laws(network: Network, elements: Sequence[Element], sizes: Sizes, *, reflect
     for (e, choice), (_, law) in zip(choices, chosen, strict=True):
         if e.name in asked:
             found.functions[e.number] = choice.functions(law)
-    names: dict[tuple[int, str], Part] = {}
+    names: dict[tuple[int, str], FamilyBox] = {}
     # names of unknowns and rows that the laws make
     for suffix, hows in (("e", ("implicit", "state")), ("p", ("state",)), ("law", ("implicit", "state", "row"))):
         kept = [e for e, law in chosen if law.how in hows]
@@ -126,7 +126,7 @@ def read_functions(network: Network) -> set[str]:
     return {n.data[0] for root in roots for n in variables(root) if n.op == "var" and n.data[1] in FUNCTIONS}
 
 
-def integrate_powers(elements: Sequence[Element], found: Laws, *, reflected: bool) -> None:
+def integrate_powers(elements: Sequence[BranchElement], found: Laws, *, reflected: bool) -> None:
     """Energies of stores whose laws have no closed integral: the integral of the power, zero at the start (language,
     section 11, 32).  E102 for dissipators, whose content is no integral by time.
     """
@@ -139,7 +139,7 @@ def integrate_powers(elements: Sequence[Element], found: Laws, *, reflected: boo
         found.states.setdefault(part.name, State(part.name, shape_of(part.box), JOULE, b.place, measured=True))
         stored, v = var(part.name, "s", *b.at), own(b, OWN[b.kind][0])
         found.dynamics.append(Dynamic(stored, mul(own(b, "be"), own(b, "bf")), b.loops, b.place))
-        found.initials.append(Initial(stored, const(0.0), True, b.loops, b.place))
+        found.initials.append(InitialCondition(stored, const(0.0), True, b.loops, b.place))
         own_variable = var(b.name, "bq" if b.kind == "potential" else "bp", *b.at)
         name = {"kinetic": "T", "potential": "V"}[b.kind]
         product = mul(own_variable, conjugate(b) if b.kind == "potential" else v)
@@ -156,7 +156,9 @@ def _read_efforts(network: Network) -> set[str]:
 class _Statement:
     """One element's contributions."""
 
-    def __init__(self, element: Element, law: Law, names: dict[tuple[int, str], Part], found: Laws) -> None:
+    def __init__(
+        self, element: BranchElement, law: BranchLaw, names: dict[tuple[int, str], FamilyBox], found: Laws
+    ) -> None:
         self.element, self.branch, self.law, self.names, self.found = element, element.branch, law, names, found
         self.place = replace(self.branch.place, element=self.branch.name)
 
@@ -167,7 +169,7 @@ class _Statement:
         found.tables.update((t.name, t) for t in law.tables)
         if law.how == "energy":
             assert law.stated is not None
-            found.energies.append(Energy(ENERGY[b.kind], law.stated, b.loops, self.place))
+            found.energies.append(EnergyTerm(ENERGY[b.kind], law.stated, b.loops, self.place))
             self._explicit()
         elif law.how == "work":
             assert law.stated is not None
@@ -197,9 +199,9 @@ class _Statement:
         b = self.branch
         stored = self.law.kept is not None or (b.stated and b.kind != "dissipator")
         if self.law.kept is not None:
-            self.found.energies.append(Energy(f"kept {b.kind}", self.law.kept, b.loops, self.place))
+            self.found.energies.append(EnergyTerm(f"kept {b.kind}", self.law.kept, b.loops, self.place))
         account = "stored" if stored else "dissipated" if b.kind == "dissipator" else "supplied"
-        self.found.works.append(Work(neg(effort), own(b, "bq"), b.loops, self.place, account))
+        self.found.works.append(VirtualWork(neg(effort), own(b, "bq"), b.loops, self.place, account))
 
     def _row(self, kind: str, equation: Node | None, unit: Unit) -> None:
         b = self.branch
@@ -227,7 +229,9 @@ class _Statement:
         self._row("gamma", self.law.stated, unit)
 
 
-def _ratios(network: Network, elements: Sequence[Element], sizes: Sizes) -> Iterator[tuple[Coupling, Part]]:
+def _ratios(
+    network: Network, elements: Sequence[BranchElement], sizes: WholeNumbers
+) -> Iterator[tuple[Coupling, FamilyBox]]:
     """Couplings with the label of their constraint."""
     live = [c for c in network.couplings if any(e.name == c.first for e in elements)]
     stems: dict[str, set[str]] = {}
@@ -244,9 +248,9 @@ def _ratios(network: Network, elements: Sequence[Element], sizes: Sizes) -> Iter
 
 def _couple(
     coupling: Coupling,
-    part: Part,
-    elements: Sequence[Element],
-    sizes: Sizes,
+    part: FamilyBox,
+    elements: Sequence[BranchElement],
+    sizes: WholeNumbers,
     found: Laws,
     *,
     keep: bool,
@@ -268,7 +272,7 @@ def _couple(
             efforts = _gyrator_by_efforts(c, part, efforts, elements, found, divided=divided)
         for effort, name in zip(efforts, (c.first, c.second), strict=True):
             place = replace(c.place, element=c.stem)
-            found.works.append(Work(neg(effort), var(name, "bq", *c.at), c.loops, place))
+            found.works.append(VirtualWork(neg(effort), var(name, "bq", *c.at), c.loops, place))
     else:
         multiplier = var(label, "mu", *c.at)
         # f1 = n f2: a flow constraint, its multiplier the effort of the first side
@@ -292,9 +296,9 @@ def _couple(
 
 def _gyrator_by_efforts(
     coupling: Coupling,
-    part: Part,
+    part: FamilyBox,
     efforts: tuple[Node, Node],
-    elements: Sequence[Element],
+    elements: Sequence[BranchElement],
     found: Laws,
     *,
     divided: bool,
@@ -317,7 +321,7 @@ def _gyrator_by_efforts(
     return made[0], made[1]
 
 
-def _at_element(effort: Node, places: Sequence[Affine], element: Element) -> Node:
+def _at_element(effort: Node, places: Sequence[Affine], element: BranchElement) -> Node:
     """An effort over the coupling's loops as one over the branch's."""
     pairs = zip(places, element.branch.at, strict=True)
     return substitute(effort, {index(a.loop): node for a, node in pairs if a.loop is not None})

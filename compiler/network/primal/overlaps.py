@@ -7,15 +7,15 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 
-from sysdyn.compiler.network.primal.bounds import Interval, Sizes, box_difference
+from sysdyn.compiler.network.primal.bounds import Interval, WholeNumbers, box_difference
 from sysdyn.dsl.model.expression import Node, both, compare, conditional, const, index, sub, substitute
-from sysdyn.dsl.model.network import Initial, Loop
+from sysdyn.dsl.model.network import InitialCondition, Loop
 from sysdyn.dsl.text.diagnostics import ModelError, Place
 
 Ranges = dict[str, Interval]
 
 
-def ranges_of(loops: Sequence[Loop], sizes: Sizes, place: Place) -> Ranges:
+def ranges_of(loops: Sequence[Loop], sizes: WholeNumbers, place: Place) -> Ranges:
     """The values of loop variables."""
     return {loop.index: sizes.interval(loop.first, loop.last, place) for loop in loops}
 
@@ -26,7 +26,9 @@ def restrict_loops(loops: Sequence[Loop], within: Ranges) -> tuple[Loop, ...]:
     return tuple(Loop(name, i.first.node, i.last.node) for name, i in pairs)
 
 
-def meeting(initial: Initial, at: Sequence[Node], within: Ranges, sizes: Sizes) -> tuple[Ranges, Node] | None:
+def meeting(
+    initial: InitialCondition, at: Sequence[Node], within: Ranges, sizes: WholeNumbers
+) -> tuple[Ranges, Node] | None:
     """The part of the ranges in which elements `at` are those that the statement is about, and its value there.
 
     None where there is no such part, or where indices do not tell it (no i + c).
@@ -62,14 +64,18 @@ def meeting(initial: Initial, at: Sequence[Node], within: Ranges, sizes: Sizes) 
     return found, substitute(initial.value, change)
 
 
-def untold(initials: Sequence[Initial], at: Sequence[Node], within: Ranges, sizes: Sizes) -> Iterator[Ranges]:
+def untold(
+    initials: Sequence[InitialCondition], at: Sequence[Node], within: Ranges, sizes: WholeNumbers
+) -> Iterator[Ranges]:
     """The parts of the ranges in which no statement is about elements `at`."""
     found = (meeting(initial, at, within, sizes) for initial in initials)
     holes = (tuple(m[0].values()) for m in found if m is not None)
     yield from (dict(zip(within, box, strict=True)) for box in box_difference(tuple(within.values()), *holes))
 
 
-def initially(initials: Sequence[Initial], at: Sequence[Node], within: Ranges, sizes: Sizes) -> Node | None:
+def initially(
+    initials: Sequence[InitialCondition], at: Sequence[Node], within: Ranges, sizes: WholeNumbers
+) -> Node | None:
     """What statements of one family, of which no two are about one element (`precedence`), say of its elements `at`:
     the value over the ranges, zero where nothing is said; None where nothing is.
     """

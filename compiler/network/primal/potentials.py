@@ -10,10 +10,10 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from sysdyn.compiler.network.primal.balances import MULTIPLIER, WALK, ZERO, Effort
-from sysdyn.compiler.network.primal.bounds import Affine, Bound, Interval, Picked
+from sysdyn.compiler.network.primal.balances import MULTIPLIER, WALK, ZERO, NodeEffort
+from sysdyn.compiler.network.primal.bounds import Affine, Interval, Picked, WholeNumber
 from sysdyn.compiler.network.primal.incidence import PLUS, Touch, unrolling_error
-from sysdyn.compiler.network.primal.reading import Range, Ranges, Rewriter
+from sysdyn.compiler.network.primal.reading import LoopRange, Ranges, Rewriter
 from sysdyn.dsl.model.expression import Node, add, const, index, linear, neg, reduction, sub, var
 from sysdyn.dsl.text.diagnostics import Diagnostic, ModelError
 from sysdyn.values import dataclass
@@ -23,7 +23,7 @@ from sysdyn.values import dataclass
 class _Visit:
     """A merged node on the way: where, by which branch end it is left, and how many terms lie behind."""
 
-    effort: Effort
+    effort: NodeEffort
     at: tuple[Node, ...]
     touch: Touch
     behind: int
@@ -41,8 +41,8 @@ class _Path:
 class Potentials:
     """Reads `ne` of every node."""
 
-    def __init__(self, efforts: Sequence[Effort]) -> None:
-        self.efforts: dict[str, list[Effort]] = {}
+    def __init__(self, efforts: Sequence[NodeEffort]) -> None:
+        self.efforts: dict[str, list[NodeEffort]] = {}
         for e in efforts:
             self.efforts.setdefault(e.node, []).append(e)
         self._serial = 0
@@ -55,14 +55,14 @@ class Potentials:
             value = sub(value, self._raw(reader, self.efforts[effort.ground][0], (), ranges))
         return reader.resolve(value, ranges, active)
 
-    def effort_of_node(self, reader: Rewriter, name: str, at: tuple[Node, ...], ranges: Ranges) -> Effort:
+    def effort_of_node(self, reader: Rewriter, name: str, at: tuple[Node, ...], ranges: Ranges) -> NodeEffort:
         """How the effort of a node is read."""
         found = self.efforts.get(name, [])
         if not found:
             raise ModelError([Diagnostic("E409", f"node {name} touches no element: it has no effort", reader.place)])
         return found[reader.locate(name, at, [e.box for e in found], ranges)]
 
-    def _raw(self, reader: Rewriter, effort: Effort, at: tuple[Node, ...], ranges: Ranges) -> Node:
+    def _raw(self, reader: Rewriter, effort: NodeEffort, at: tuple[Node, ...], ranges: Ranges) -> Node:
         """Effort against the component's reference."""
         if effort.how == MULTIPLIER:
             return var(effort.label, "mu", *at)
@@ -72,7 +72,7 @@ class Potentials:
         best = min(paths, key=lambda p: (p.kinetic, len(p.terms) + (p.base != const(0.0))))
         return add(best.base, *best.terms)
 
-    def _path(self, reader: Rewriter, effort: Effort, at: tuple[Node, ...], touch: Touch, ranges: Ranges) -> _Path:
+    def _path(self, reader: Rewriter, effort: NodeEffort, at: tuple[Node, ...], touch: Touch, ranges: Ranges) -> _Path:
         """The way from a node to one whose effort is known: terms along merged elements, periods of a run summed up."""
         terms: list[Node] = []
         visits: list[_Visit] = []
@@ -100,10 +100,10 @@ class Potentials:
         reader: Rewriter,
         visits: list[_Visit],
         start: _Visit,
-        now: tuple[Effort, tuple[Node, ...]],
+        now: tuple[NodeEffort, tuple[Node, ...]],
         terms: list[Node],
         ranges: Ranges,
-    ) -> tuple[list[Node], tuple[Node, ...], Effort, str]:
+    ) -> tuple[list[Node], tuple[Node, ...], NodeEffort, str]:
         """Sum the period that leads from `start` to `now`, one index further, over the rest of the run."""
         before, behind = reader.affine(start.at, ranges), reader.affine(now[1], ranges)
         shifts = [b.offset.value - a.offset.value for a, b in zip(before, behind, strict=True)]
@@ -116,10 +116,10 @@ class Potentials:
         self._serial += 1
         counter = f"#w{self._serial}"
         held = {name: r.interval for name, r in ranges.items()}
-        own = {**ranges, counter: Range(before[d].over(held))}
+        own = {**ranges, counter: LoopRange(before[d].over(held))}
         at: tuple[Node, ...] = (*start.at[:d], index(counter), *start.at[d + 1 :])
         period: list[Node] = []
-        limits: list[Bound] = []
+        limits: list[WholeNumber] = []
         effort, touch = start.effort, start.touch
         # one period at a counter, and how far each of its cells reaches
         for _ in visits[visits.index(start) :]:
@@ -147,13 +147,13 @@ def _step(touch: Touch, at: tuple[Node, ...]) -> tuple[Node, str, tuple[Node, ..
     return effort if touch.end == PLUS else neg(effort), other.node, tuple(a.substitute_loops(loops) for a in other.at)
 
 
-def _other(effort: Effort, arrival: Touch) -> Touch:
+def _other(effort: NodeEffort, arrival: Touch) -> Touch:
     """The end by which a merged node is left when it was reached through `arrival`."""
     by = (arrival.element.number, 1 - arrival.end)
     return next(t for t in effort.cell.touches if (t.element.number, t.end) != by)
 
 
-def _limits(effort: Effort, at: tuple[Affine | Picked, ...], counter: str, step: int) -> list[Bound]:
+def _limits(effort: NodeEffort, at: tuple[Affine | Picked, ...], counter: str, step: int) -> list[WholeNumber]:
     """How far the counter may run before this node leaves the box in which it is merged."""
     boxes: list[tuple[Interval, Affine | Picked]] = list(zip(effort.box, at, strict=True))
     return [(i.first if step < 0 else i.last).minus(a.offset) for i, a in boxes if a.loop == counter]

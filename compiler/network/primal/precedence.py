@@ -13,25 +13,27 @@ from bisect import bisect_left, bisect_right
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 
-from sysdyn.compiler.network.primal.bounds import Sizes
+from sysdyn.compiler.network.primal.bounds import WholeNumbers
 from sysdyn.compiler.network.primal.overlaps import ranges_of, restrict_loops, untold
-from sysdyn.dsl.model.network import Branch, Initial, Network
+from sysdyn.dsl.model.network import Branch, InitialCondition, Network
 from sysdyn.dsl.text.diagnostics import ModelError
 
 _SAME = {"p": "f", "np": "nf"}
 _OF_STORE = {("potential", "be"): "bq", ("kinetic", "bp"): "bf"}
 
 _Key = tuple[str, str]
-_Ranked = tuple[int, Initial]
+_Ranked = tuple[int, InitialCondition]
 """A statement with its place in the order of the text."""
 
 
 def outermost(network: Network) -> Network:
     """The network with every initial value that another replaces left out, element by element."""
-    return replace(network, initials=foremost(network.initials, network.branches, Sizes(network)))
+    return replace(network, initials=foremost(network.initials, network.branches, WholeNumbers(network)))
 
 
-def foremost(initials: Sequence[Initial], branches: Sequence[Branch], sizes: Sizes) -> tuple[Initial, ...]:
+def foremost(
+    initials: Sequence[InitialCondition], branches: Sequence[Branch], sizes: WholeNumbers
+) -> tuple[InitialCondition, ...]:
     """The initial values that no other replaces, cut where others are about a part of their elements."""
     kinds = {b.name: b.kind for b in branches}
     said: dict[_Key, list[_Ranked]] = {}
@@ -41,18 +43,18 @@ def foremost(initials: Sequence[Initial], branches: Sequence[Branch], sizes: Siz
     if all(len(found) == 1 for found in said.values()):
         return tuple(initials)
     books = {key: _Statements(found, sizes) for key, found in said.items()}
-    kept: list[Initial] = []
+    kept: list[InitialCondition] = []
     for k, initial in enumerate(initials):
         book = books[_key(initial, kinds)] if _of_an_unknown(initial) else None
         kept += [initial] if book is None else _remaining_parts(initial, book.before((k, initial)), sizes)
     return tuple(kept)
 
 
-def _of_an_unknown(initial: Initial) -> bool:
+def _of_an_unknown(initial: InitialCondition) -> bool:
     return initial.target.op == "var" and not initial.target.data[2]
 
 
-def _key(initial: Initial, kinds: Mapping[str, str]) -> _Key:
+def _key(initial: InitialCondition, kinds: Mapping[str, str]) -> _Key:
     name, kind, _ = initial.target.data
     return name, _SAME.get(kind) or _OF_STORE.get((kinds.get(name, ""), kind), kind)
 
@@ -60,7 +62,7 @@ def _key(initial: Initial, kinds: Mapping[str, str]) -> _Key:
 class _Statements:
     """Those of one family; what names one element by itself is found by its indices."""
 
-    def __init__(self, found: Sequence[_Ranked], sizes: Sizes) -> None:
+    def __init__(self, found: Sequence[_Ranked], sizes: WholeNumbers) -> None:
         self.sizes = sizes
         self.running = [item for item in found if item[1].loops]
         single = [(self._reach(item[1])[0], item) for item in found if not item[1].loops]
@@ -68,7 +70,7 @@ class _Statements:
         self.single = [item for _, item in single]
         self.at = [at for at, _ in single]
 
-    def _reach(self, initial: Initial) -> tuple[tuple[float, ...], tuple[float, ...]]:
+    def _reach(self, initial: InitialCondition) -> tuple[tuple[float, ...], tuple[float, ...]]:
         """The least and the greatest of each index; all there is where a range follows another index."""
         try:
             within = ranges_of(initial.loops, self.sizes, initial.place)
@@ -77,7 +79,7 @@ class _Statements:
             return (), (math.inf,)
         return tuple(i.first.value for i in box), tuple(i.last.value for i in box)
 
-    def before(self, one: _Ranked) -> list[Initial]:
+    def before(self, one: _Ranked) -> list[InitialCondition]:
         """The statements that go before one and may be about its elements."""
         low, high = self._reach(one[1])
         near = self.single[bisect_left(self.at, low) : bisect_right(self.at, high)]
@@ -85,11 +87,13 @@ class _Statements:
         return [other for other in above if not one[1].fixed or other.depth < one[1].depth]
 
 
-def _rank(k: int, initial: Initial) -> tuple[int, bool, int]:
+def _rank(k: int, initial: InitialCondition) -> tuple[int, bool, int]:
     return initial.depth, not initial.fixed, -k
 
 
-def _remaining_parts(initial: Initial, others: Sequence[Initial], sizes: Sizes) -> Iterator[Initial]:
+def _remaining_parts(
+    initial: InitialCondition, others: Sequence[InitialCondition], sizes: WholeNumbers
+) -> Iterator[InitialCondition]:
     """What no statement that goes before is about."""
     within = ranges_of(initial.loops, sizes, initial.place)
     for rest in untold(others, initial.target.args, within, sizes):

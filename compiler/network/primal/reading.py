@@ -12,9 +12,9 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import field
 from typing import TypeVar
 
-from sysdyn.compiler.network.primal.bounds import Affine, Bound, Box, Interval, Picked, Sizes, box_holds
-from sysdyn.compiler.network.primal.incidence import Contact, Element, unrolling_error
-from sysdyn.compiler.network.primal.series import Member
+from sysdyn.compiler.network.primal.bounds import Affine, Box, Interval, Picked, WholeNumber, WholeNumbers, box_holds
+from sysdyn.compiler.network.primal.incidence import BranchElement, BranchEnd, unrolling_error
+from sysdyn.compiler.network.primal.series import SeriesMember
 from sysdyn.dsl.model.calculus import time_derivative
 from sysdyn.dsl.model.expression import (
     Node,
@@ -49,20 +49,20 @@ KINDS = frozenset(("be", "bf", "bq", "bp", "ne", "nf", "nq", "np")) | FUNCTIONS 
 
 
 @dataclass(frozen=True, slots=True)
-class Range:
+class LoopRange:
     """The values of a loop variable; one whose bounds follow another index cannot be cut."""
 
     interval: Interval
     cuttable: bool = True
 
 
-Ranges = Mapping[str, Range]
+Ranges = Mapping[str, LoopRange]
 
 
 class _BoxSplitError(Exception):
     """An index runs over two pieces: its loop is to be cut before `at`."""
 
-    def __init__(self, loop: str, at: Bound, name: str) -> None:
+    def __init__(self, loop: str, at: WholeNumber, name: str) -> None:
         super().__init__(loop)
         self.loop, self.at, self.name = loop, at, name
 
@@ -72,8 +72,8 @@ class IndexBox:
     """Branches of a family that read alike."""
 
     box: Box
-    element: Element
-    member: Member | None = None
+    element: BranchElement
+    member: SeriesMember | None = None
 
 
 @dataclass(slots=True)
@@ -100,7 +100,7 @@ def touches_network(root: Node) -> bool:
 class Rewriter:
     """Resolves expressions of one network."""
 
-    def __init__(self, sizes: Sizes, book: EliminationTable) -> None:
+    def __init__(self, sizes: WholeNumbers, book: EliminationTable) -> None:
         self.sizes = sizes
         self.book = book
         self.place: Place | None = None
@@ -122,7 +122,7 @@ class Rewriter:
     ) -> Iterator[tuple[tuple[Loop, ...], Result]]:
         """What `work` finds for the ranges of the loops, which are cut until it finds one thing only."""
         self.place = place
-        ranges: dict[str, Range] = {}
+        ranges: dict[str, LoopRange] = {}
         for loop in loops:
             ranges[loop.index] = self.range_of(loop.first, loop.last, ranges)
             if not ranges[loop.index].interval.size:
@@ -147,12 +147,12 @@ class Rewriter:
             text = f"{found.name} changes its meaning along {found.loop}, whose range follows another index"
             raise ModelError([Diagnostic("E806", f"{text}: it would have to be unrolled", self.place)])
 
-    def range_of(self, first: Node, last: Node, outer: Ranges) -> Range:
+    def range_of(self, first: Node, last: Node, outer: Ranges) -> LoopRange:
         """The range of a loop inside others."""
         held = {name: r.interval for name, r in outer.items()}
         ends = [self.sizes.affine(node, held, self.place) for node in (first, last)]
         low, high = (a.over(held) for a in ends)
-        return Range(Interval(low.first, high.last), all(a.loop is None for a in ends))
+        return LoopRange(Interval(low.first, high.last), all(a.loop is None for a in ends))
 
     # -- expressions --------------------------------------------------------------------------------------------
 
@@ -256,7 +256,7 @@ class Rewriter:
         constant, fixed = content
         return add(value, param(constant, *node.args) if fixed else var(constant, "s", *node.args))
 
-    def _end(self, contact: Contact, kind: str, piece: IndexBox, at: tuple[Node, ...]) -> Node:
+    def _end(self, contact: BranchEnd, kind: str, piece: IndexBox, at: tuple[Node, ...]) -> Node:
         """A quantity of the node at one end; that of a common-flow ground is zero."""
         if contact.node.startswith("#ground ") and kind != "ne":
             return const(0.0)
@@ -317,6 +317,6 @@ class Rewriter:
         raise ModelError([Diagnostic("E805", f"{name}[{text}] is outside its range", self.place)])
 
 
-def _halves(loop: Loop, at: Bound) -> tuple[Loop, Loop]:
+def _halves(loop: Loop, at: WholeNumber) -> tuple[Loop, Loop]:
     before = linear(-1.0, ((1.0, at.node),))
     return Loop(loop.index, loop.first, before), Loop(loop.index, at.node, loop.last)

@@ -13,30 +13,30 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 from dataclasses import replace
 
-from sysdyn.compiler.network.primal.bounds import Bound, Box, number, parts, shape_of, union
-from sysdyn.compiler.network.primal.incidence import Element, Incidence, NodeCell, Touch, ground
-from sysdyn.compiler.network.primal.index_classes import Cell, End, IndexClasses, Link
+from sysdyn.compiler.network.primal.bounds import Box, WholeNumber, number, parts, shape_of, union
+from sysdyn.compiler.network.primal.incidence import BranchElement, Incidence, NodeCell, Touch, ground
+from sysdyn.compiler.network.primal.index_classes import Cell, IndexClasses, Link, LinkEnd
 from sysdyn.dsl.model.expression import Node, add
 from sysdyn.dsl.model.network import Coordinate, Shape
 from sysdyn.values import dataclass
 
-Places = tuple[tuple[int | None, Bound], ...]
+Places = tuple[tuple[int | None, WholeNumber], ...]
 
 
 @dataclass(frozen=True, slots=True)
-class Member:
+class SeriesMember:
     """Elements of a branch in a series class: their flow is sign * (flow of the coordinate).
 
     Each index of the coordinate (and of the leader, the branch whose displacement it is) is (index of the branch's
     name, offset) or (None, constant).  leads: these branches are their own leaders.
     """
 
-    element: Element
+    element: BranchElement
     box: Box  # of the name's indices
     sign: int
     coordinate: str
     index: Places
-    leader: Element
+    leader: BranchElement
     leader_index: Places
     leads: bool
 
@@ -54,7 +54,7 @@ class Series:
     """Coordinates and members of all series classes; merged node cells."""
 
     coordinates: tuple[Coordinate, ...]
-    members: tuple[Member, ...]
+    members: tuple[SeriesMember, ...]
     merged: tuple[NodeCell, ...]
 
 
@@ -114,12 +114,12 @@ def _link(cell: NodeCell, number_of: dict[int, int]) -> Link:
     return Link(cell.box, _end(first, number_of), _end(second, number_of), sign)
 
 
-def _end(touch: Touch, number_of: dict[int, int]) -> End:
-    at: list[tuple[int | None, Bound]] = []
+def _end(touch: Touch, number_of: dict[int, int]) -> LinkEnd:
+    at: list[tuple[int | None, WholeNumber]] = []
     for name in touch.element.loops:
         d = next(d for d, a in enumerate(touch.contact.at) if a.loop == name)
         at.append((d, number(0).minus(touch.contact.at[d].offset)))
-    return End(number_of[touch.element.number], tuple(at))
+    return LinkEnd(number_of[touch.element.number], tuple(at))
 
 
 @dataclass(frozen=True, slots=True)
@@ -130,7 +130,9 @@ class _Class:
     kept: tuple[int, ...]  # indices of the leader's name that the coordinate has
 
 
-def _classes(flowing: Sequence[Element], likeness: IndexClasses) -> tuple[tuple[Coordinate, ...], tuple[Member, ...]]:
+def _classes(
+    flowing: Sequence[BranchElement], likeness: IndexClasses
+) -> tuple[tuple[Coordinate, ...], tuple[SeriesMember, ...]]:
     """Coordinates of the classes of equal flows, and the members of each class with sign and indices."""
     classes = sorted((_class(m, flowing, likeness) for m in likeness.groups().values()), key=lambda c: c.leader)
     named = [_family(c, flowing, likeness) for c in classes]
@@ -138,7 +140,7 @@ def _classes(flowing: Sequence[Element], likeness: IndexClasses) -> tuple[tuple[
     names = iter(parts(plain))
     taken = {p.name for p in parts(plain)}
     coordinates: dict[str, Coordinate] = {}
-    members: list[Member] = []
+    members: list[SeriesMember] = []
     # a class over a whole family keeps its name and range
     for c, (name, box, whole) in zip(classes, named, strict=True):
         if whole:
@@ -158,7 +160,7 @@ def _unique_name(name: str, taken: set[str]) -> str:
     return next(n for k in range(2, len(taken) + 3) if (n := f"{name}.{k}") not in taken)
 
 
-def _class(members: list[tuple[Cell, int]], flowing: Sequence[Element], likeness: IndexClasses) -> _Class:
+def _class(members: list[tuple[Cell, int]], flowing: Sequence[BranchElement], likeness: IndexClasses) -> _Class:
     """The leader is the first potential store, else the first branch; runs lose the index they run along."""
     stores = [m for m in members if flowing[m[0][0]].branch.kind == "potential"]
     leader, sign = (stores or members)[0]
@@ -174,31 +176,31 @@ def _has_tied_elements(cell: Cell, likeness: IndexClasses) -> bool:
     return any(likeness.is_collapsed(cell, likeness.axis(cell[0], d)[0], k) for d, k in enumerate(cell[1]))
 
 
-def _family(c: _Class, flowing: Sequence[Element], likeness: IndexClasses) -> tuple[str, Box, bool]:
+def _family(c: _Class, flowing: Sequence[BranchElement], likeness: IndexClasses) -> tuple[str, Box, bool]:
     element = flowing[c.leader[0]]
     box = _box_of_indices(element, likeness.box(c.leader))
     return element.name, box, len(c.kept) == len(element.at)
 
 
-def _box_of_indices(element: Element, box: Box) -> Box:
+def _box_of_indices(element: BranchElement, box: Box) -> Box:
     """A box of loop variables as one of the name's indices."""
     ranges = dict(zip(element.loops, box, strict=True))
     return tuple(a.over(ranges) for a in element.at)
 
 
-def _coordinate(name: str, shape: Shape, leader: Element) -> Coordinate:
+def _coordinate(name: str, shape: Shape, leader: BranchElement) -> Coordinate:
     d = leader.branch.domain
     return Coordinate(name, shape, False, d.displacement, d.flow, d.momentum, d.effort, None, leader.branch.place)
 
 
-def _members(c: _Class, name: str, flowing: Sequence[Element], likeness: IndexClasses) -> Iterable[Member]:
+def _members(c: _Class, name: str, flowing: Sequence[BranchElement], likeness: IndexClasses) -> Iterable[SeriesMember]:
     """Elements of a class by the leader's indices; those along which all are tied have one value."""
     leader = flowing[c.leader[0]]
     first = likeness.box(c.leader)
     for cell, sign in c.members:
         element = flowing[cell[0]]
         own = {likeness.axis(cell[0], d)[0]: d for d in range(len(element.loops))}
-        at: list[tuple[int | None, Bound]] = []
+        at: list[tuple[int | None, WholeNumber]] = []
         for k, place in enumerate(leader.at):
             # a fixed index
             if place.loop is None:
@@ -215,12 +217,12 @@ def _members(c: _Class, name: str, flowing: Sequence[Element], likeness: IndexCl
         leads = cell == c.leader and not _has_tied_elements(cell, likeness)
         kept = tuple(at[k] for k in c.kept)
         box = _box_of_indices(element, likeness.box(cell))
-        yield Member(element, box, sign * c.sign, name, kept, leader, tuple(at), leads)
+        yield SeriesMember(element, box, sign * c.sign, name, kept, leader, tuple(at), leads)
 
 
-def _fewer(members: Sequence[Member]) -> Iterable[Member]:
+def _fewer(members: Sequence[SeriesMember]) -> Iterable[SeriesMember]:
     """Members that say the same of neighbouring boxes made one."""
-    groups: dict[tuple[object, ...], list[Member]] = {}
+    groups: dict[tuple[object, ...], list[SeriesMember]] = {}
     for m in members:
         at = tuple((k, c.value) for k, c in (*m.index, *m.leader_index))
         groups.setdefault((m.element.number, m.sign, m.coordinate, at, m.leads), []).append(m)

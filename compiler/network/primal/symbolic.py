@@ -12,7 +12,7 @@ from typing import Any
 from sysdyn.dsl.model.expression import Node, add, call, const, mul, product, topological
 
 
-class Algebra:
+class SignedAlgebra:
     """One unknown v, one value w and parameters of known sign."""
 
     def __init__(self, v: Node, w: Node, signs: Mapping[Node, int], *, positive: bool) -> None:

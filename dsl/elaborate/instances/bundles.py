@@ -25,10 +25,10 @@ class Bundles:
     """The bundles that a file declares, in any order; one that cannot be read counts as broken."""
 
     def __init__(self, file: syntax.File, scope: Scope, report: Report) -> None:
-        self._items = [i for i in file.items if isinstance(i, syntax.Bundle)]
+        self._items = [i for i in file.items if isinstance(i, syntax.BundleDefinition)]
         self._by_name = {i.name.name: i for i in reversed(self._items)}
-        self._read: dict[syntax.Bundle, BundleSymbol | None] = {}
-        self._open: list[syntax.Bundle] = []
+        self._read: dict[syntax.BundleDefinition, BundleSymbol | None] = {}
+        self._open: list[syntax.BundleDefinition] = []
         self._source, self._scope, self._report = file.source, scope, report
 
     def declare(self, enter: Callable[[Symbol, Scope], None]) -> None:
@@ -40,7 +40,7 @@ class Bundles:
             else:
                 enter(symbol, self._scope)
 
-    def _symbol(self, item: syntax.Bundle) -> BundleSymbol | None:
+    def _symbol(self, item: syntax.BundleDefinition) -> BundleSymbol | None:
         if item not in self._read:
             self._open.append(item)
             members = list(self._members(item))
@@ -50,12 +50,14 @@ class Bundles:
             self._read[item] = BundleSymbol(item.name.name, found, place) if len(found) == len(members) else None
         return self._read[item]
 
-    def _members(self, item: syntax.Bundle) -> Iterator[tuple[syntax.Word, DomainSymbol | BundleSymbol | None]]:
+    def _members(
+        self, item: syntax.BundleDefinition
+    ) -> Iterator[tuple[syntax.Word, DomainSymbol | BundleSymbol | None]]:
         """Words of a bundle's members with their kinds: a domain, another bundle, None where that could not be read."""
         before: dict[str, syntax.Word] = {}
         for member in item.members:
             # a member that could not be read leaves the bundle incomplete: the caller learns it by a None
-            if isinstance(member, syntax.Broken):
+            if isinstance(member, syntax.BrokenStatement):
                 yield item.name, None
                 continue
             kind = self._kind(member.domain)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from sysdyn.dsl.elaborate.parts import ElaborationContext
 from sysdyn.dsl.elaborate.statements.statements import Statements
 from sysdyn.dsl.model import dimensions as dim
 from sysdyn.dsl.model import expression as ex
@@ -34,12 +35,16 @@ class Ends:
     domain: DomainSymbol | None
 
 
-class Connections(Statements):
+class Connections:
     """Resolves ends of branches and labels of instances."""
 
-    def _label(self, s: syntax.Instance) -> tuple[tuple[Node, ...], Shape]:
+    def __init__(self, context: ElaborationContext, equations: Statements) -> None:
+        self.context, self.resolver, self.parts = context, context.resolver, context.parts
+        self.equations = equations
+
+    def label_indices(self, s: syntax.InstanceStatement) -> tuple[tuple[Node, ...], Shape]:
         """Indices of a label, and first and last of each; a `for` around must show in them."""
-        own = self.resolver.loops[len(self.current.loops) :]
+        own = self.resolver.loops[len(self.context.current.loops) :]
         # `R1: resistor(...)`: one element
         if not own and not s.decl.indices:
             return (), ()
@@ -48,7 +53,7 @@ class Connections(Statements):
         for node, index in zip(at, s.decl.indices, strict=True):
             # `R[i]` in `for i in 1..n`: the array has the range of the loop
             if node.op == "index":
-                shape.append(self.bounds(index))
+                shape.append(self.context.bounds(index))
             # `R[i+1]`: which elements there are could not be told from the label
             elif any(n.op == "index" for n in ex.topological([node])):
                 help_ = f"{s.decl.name}[{own[-1].index}] in a 'for' over the range that is meant" if own else None
@@ -64,7 +69,9 @@ class Connections(Statements):
             raise self.resolver.fail("E106", message, s.decl.span, help=f"{s.decl.name}[{own[-1].index}]")
         return at, tuple(shape)
 
-    def _ends(self, s: syntax.Instance, connection: syntax.Connection, domain: DomainSymbol | None = None) -> Ends:
+    def ends_of(
+        self, s: syntax.InstanceStatement, connection: syntax.Connection, domain: DomainSymbol | None = None
+    ) -> Ends:
         """Ends of a branch from `a -> b`, `a` (for a -> ground) or `on expr`."""
         match connection:
             # `a -> b`
@@ -76,10 +83,10 @@ class Connections(Statements):
             # `on x`: along a displacement, whose rate is the flow of the branch
             case syntax.On():
                 value = self.resolver.scalar(connection.expr)
-                self._is_displacement(value.node, connection.expr, s.decl.name)
+                self.equations.require_displacement(value.node, connection.expr, s.decl.name)
                 own = self._domain_on(connection.expr, value)
                 if own is not None and domain is not None and own.name != domain.name:
-                    message = f"'{s.decl.name}' is {domain.name}, '{self._text(connection.expr)}' is {own.name}"
+                    message = f"'{s.decl.name}' is {domain.name}, '{self.end_text(connection.expr)}' is {own.name}"
                     help_ = "a gyrator or transformer couples domains"
                     raise self.resolver.fail("E401", message, connection.span, help=help_)
                 self._is_displacement_of(s, own or domain, value, connection)
@@ -123,7 +130,9 @@ class Connections(Statements):
     def other_domain(self, message: str, wanted: DomainSymbol, end: End, span: syntax.Span) -> Failed:
         """Report E401: an end of another domain than is wanted, with the nodes that would do."""
         right = [
-            n for n in self.scope.names() if isinstance(s := self.scope.find(n), NodeSymbol) and s.domain is wanted
+            n
+            for n in self.context.scope.names()
+            if isinstance(s := self.context.scope.find(n), NodeSymbol) and s.domain is wanted
         ]
         help_ = f"{wanted.name}: {', '.join(right[:5])}; " if right else f"a node of {wanted.name}; "
         help_ += "a transformer, gyrator or source couples domains"
@@ -132,7 +141,7 @@ class Connections(Statements):
         return self.resolver.fail("E401", message, span, help=help_, subject=subject)
 
     def _is_displacement_of(
-        self, s: syntax.Instance, domain: DomainSymbol | None, value: Typed, connection: syntax.On
+        self, s: syntax.InstanceStatement, domain: DomainSymbol | None, value: Typed, connection: syntax.On
     ) -> None:
         """E208: the expression along which an element acts is a displacement of its domain."""
         if domain is None or value.dimension is None or value.dimension == domain.displacement.dimension:
@@ -169,7 +178,7 @@ class Connections(Statements):
             root = e
             while isinstance(root, (syntax.Item, syntax.Member)):
                 root = root.base
-            if isinstance(root, syntax.Name) and self.scope.find(root.name) is None:
+            if isinstance(root, syntax.Name) and self.context.scope.find(root.name) is None:
                 raise self._unknown_node(root, domain)
             raise self._no_node(e, None)
         match symbol:
@@ -180,11 +189,11 @@ class Connections(Statements):
                 end = symbol.end
                 return End(end.node, tuple(ex.substitute(a, found.change) for a in end.at), end.domain)
             case NodeSymbol():
-                return self._node_end(symbol, found.indices, found.change, e)
+                return self.node_end(symbol, found.indices, found.change, e)
             # `coord x: translation` is a node of a common-flow domain; one of a common-effort domain (a charge) is not
             case UnknownSymbol() if symbol.kind == "q" and symbol.domain is not None:
                 if symbol.domain.common == "effort":
-                    help_ = f"'on {self._text(e)}' instead of '->'"
+                    help_ = f"'on {self.end_text(e)}' instead of '->'"
                     raise self.resolver.fail(
                         "E415",
                         f"'{symbol.name}' is a coordinate of a common-effort domain, not a node",
@@ -193,39 +202,44 @@ class Connections(Statements):
                     )
                 node = coordinate_node(symbol)
                 assert node is not None
-                return self._node_end(node, found.indices, found.change, e)
+                return self.node_end(node, found.indices, found.change, e)
             case Unsupported():
                 raise Failed
         raise self._no_node(e, symbol)
 
     def _unknown_node(self, root: syntax.Name, domain: DomainSymbol | None) -> Failed:
         """Report E101: a name that stands for nothing where a node is wanted."""
-        nodes = [n for n in self.scope.names() if isinstance(self.scope.find(n), (NodeSymbol, PortSymbol))]
+        nodes = [
+            n for n in self.context.scope.names() if isinstance(self.context.scope.find(n), (NodeSymbol, PortSymbol))
+        ]
         near = nearest(root.name, nodes)
         if near is not None or domain is None or nearest(root.name, ("ground", "gnd", "GND", "vss")):
             return self.resolver.report_unknown(root.name, root.span)
-        if self.scope.is_broken(root.name):
+        if self.context.scope.is_broken(root.name):
             return Failed()
         message, help_ = f"unknown name '{root.name}': no node is called so", f"node {root.name}: {domain.name}"
         return self.resolver.fail("E101", message, root.span, help=help_, subject=f"name {root.name}")
 
     def _no_node(self, e: syntax.Expr, symbol: object) -> Failed:
-        text = self._text(e)
+        text = self.end_text(e)
         help_ = f"on {text}.q: the element shares the ends of '{text}'" if isinstance(symbol, BranchSymbol) else None
         return self.resolver.fail("E407", f"'{text}' is no node", e.span, help=help_)
 
-    def _node_end(
+    def node_end(
         self, symbol: NodeSymbol, indices: tuple[syntax.Index, ...], change: dict[Node, Node], e: syntax.Expr
     ) -> End:
+        """A node as an end, with its indices; change: of loop variables by those of the instance around."""
         if not indices and not symbol.family.shape and not symbol.family.prefix:
             return End(symbol, (), symbol.domain)
         at = (*symbol.family.prefix, *self.resolver.indices(symbol.name, symbol.family.shape, indices, e.span))
         return End(symbol, tuple(ex.substitute(a, change) for a in at), symbol.domain)
 
-    def _text(self, e: syntax.Expr) -> str:
-        return self.source_text(e.span)[:60]
+    def end_text(self, e: syntax.Expr) -> str:
+        """The author's text of an end, as messages quote it."""
+        return self.context.source_text(e.span)[:60]
 
-    def _domain_of(self, s: syntax.Instance, ends: Ends) -> DomainSymbol:
+    def domain_of(self, s: syntax.InstanceStatement, ends: Ends) -> DomainSymbol:
+        """The domain of a branch by its ends (E403 where they have none)."""
         if ends.domain is None:
             raise self.resolver.fail(
                 "E403",
@@ -237,15 +251,15 @@ class Connections(Statements):
 
     def _domain_on(self, e: syntax.Expr, value: Typed) -> DomainSymbol | None:
         """Domain of one coordinate, branch or node; else the one domain whose displacement has that dimension."""
-        inner = e.expr if isinstance(e, syntax.Group) else e
+        inner = e.expr if isinstance(e, syntax.Parenthesized) else e
         found = self.resolver.locate(inner.base if isinstance(inner, syntax.Member) and inner.name == "q" else inner)
         if found is not None and isinstance(found.symbol, (UnknownSymbol, BranchSymbol, NodeSymbol)):
             return found.symbol.domain
         if found is not None and isinstance(found.symbol, PortSymbol):
             return found.symbol.end.domain
         domains = {}
-        for name in self.scope.names():
-            symbol = self.scope.find(name)
+        for name in self.context.scope.names():
+            symbol = self.context.scope.find(name)
             if isinstance(symbol, DomainSymbol) and symbol.displacement.dimension == value.dimension:
                 domains[name] = symbol
         return next(iter(domains.values())) if len(domains) == 1 else None

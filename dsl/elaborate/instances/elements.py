@@ -6,6 +6,7 @@ from collections.abc import Callable
 from dataclasses import replace
 
 from sysdyn.dsl.elaborate.instances.connections import Connections, Ends
+from sysdyn.dsl.elaborate.parts import ElaborationContext
 from sysdyn.dsl.elaborate.statements import friction
 from sysdyn.dsl.model import expression as ex
 from sysdyn.dsl.model.expression import Node
@@ -17,12 +18,12 @@ from sysdyn.dsl.names.symbols import (
     BranchSymbol,
     DomainSymbol,
     End,
-    Family,
+    NameFamily,
     Space,
     TwoPortSymbol,
     Typed,
 )
-from sysdyn.dsl.text.diagnostics import Place, Related, Report
+from sysdyn.dsl.text.diagnostics import Place, Related
 from sysdyn.dsl.tree import syntax
 from sysdyn.values import dataclass
 
@@ -36,17 +37,18 @@ class Pending:
     resolve: Callable[[], None]
 
 
-class Elements(Connections):
+class Elements:
     """Elaborates builtin elements and component laws."""
 
-    def __init__(self, report: Report) -> None:
-        super().__init__(report)
+    def __init__(self, context: ElaborationContext, connections: Connections) -> None:
+        self.context, self.resolver, self.parts = context, context.resolver, context.parts
+        self.connections = connections
         self.pending: list[Pending] = []
 
-    def _builtin(self, s: syntax.Instance) -> None:
+    def add_builtin(self, s: syntax.InstanceStatement) -> None:
         """A one-port or two-port: its ends, its branches, its law for later."""
         kind = s.component.names[0]
-        at, shape = self._label(s)
+        at, shape = self.connections.label_indices(s)
         side, value, span = self._law_argument(s, kind)
         # one branch: potential, kinetic, dissipator, effort, flow
         if kind in ONE_PORTS:
@@ -55,8 +57,8 @@ class Elements(Connections):
                 raise self.resolver.fail(
                     "E402", f"'{s.decl.name}: {kind}' needs {wants}, has {len(s.connections)}", s.span
                 )
-            ends = self._ends(s, s.connections[0])
-            symbol = self._branch_symbol(s, s.decl.name, self._domain_of(s, ends), shape)
+            ends = self.connections.ends_of(s, s.connections[0])
+            symbol = self._branch_symbol(s, s.decl.name, self.connections.domain_of(s, ends), shape)
             self._enter_element(symbol, symbol)
             self._later_law(symbol, at, side, value, kind, span, ends, s)
             return
@@ -66,14 +68,15 @@ class Elements(Connections):
             raise self.resolver.fail(
                 "E402", f"'{s.decl.name}: {kind}' needs 2 branches, has {len(connections)}", s.span
             )
-        both = [self._ends(s, c) for c in connections]
+        both = [self.connections.ends_of(s, c) for c in connections]
         one, two = (
-            self._branch_symbol(s, f"{s.decl.name}#{k}", self._domain_of(s, e), shape) for k, e in enumerate(both, 1)
+            self._branch_symbol(s, f"{s.decl.name}#{k}", self.connections.domain_of(s, e), shape)
+            for k, e in enumerate(both, 1)
         )
-        self._enter_element(TwoPortSymbol(s.decl.name, (one, two), self.place(s.decl.span)), one)
+        self._enter_element(TwoPortSymbol(s.decl.name, (one, two), self.context.place(s.decl.span)), one)
         self._later_ratio((one, two), at, (kind, side, value, span), (both[0], both[1]), s)
 
-    def _law_argument(self, s: syntax.Instance, kind: str) -> tuple[str, syntax.Expr, syntax.Span]:
+    def _law_argument(self, s: syntax.InstanceStatement, kind: str) -> tuple[str, syntax.Expr, syntax.Span]:
         """Which variable the law of a builtin element gives, the expression, its place."""
         sides = ("e", "f", "p", "q") if kind in ONE_PORTS else ("e1", "e2", "f1", "f2")
         args = s.args or ()
@@ -81,7 +84,7 @@ class Elements(Connections):
             help_ = f"{kind}({sides[0]} = ...)"
             raise self.resolver.fail("E303", f"'{kind}' takes one law, {len(args)} given", s.span, help=help_)
         if args[0].name is None:
-            text, side = self.source_text(args[0].span), "f" if kind in ("flow", "kinetic") else sides[0]
+            text, side = self.context.source_text(args[0].span), "f" if kind in ("flow", "kinetic") else sides[0]
             message = f"'{text}' is a positional argument: '{kind}' is given its law by name"
             raise self.resolver.fail("E404", message, args[0].span, help=f"{side} = {text}")
         if args[0].name not in sides:
@@ -90,25 +93,27 @@ class Elements(Connections):
             )
         return args[0].name, args[0].value, args[0].span
 
-    def _branch_symbol(self, s: syntax.Instance, name: str, domain: DomainSymbol, shape: Shape) -> BranchSymbol:
-        return BranchSymbol(name, self.current.family(name, shape), domain, self.place(s.decl.span))
+    def _branch_symbol(
+        self, s: syntax.InstanceStatement, name: str, domain: DomainSymbol, shape: Shape
+    ) -> BranchSymbol:
+        return BranchSymbol(name, self.context.current.family(name, shape), domain, self.context.place(s.decl.span))
 
     def _enter_element(self, symbol: BranchSymbol | TwoPortSymbol, first: BranchSymbol) -> None:
         """Enter a label; several loops over disjoint ranges may declare one."""
-        before = self.scope.symbols.get(symbol.name)
+        before = self.context.scope.symbols.get(symbol.name)
         if type(before) is not type(symbol) or not first.family.shape:
-            self.enter(symbol)
+            self.context.enter(symbol)
             return
         assert isinstance(before, (BranchSymbol, TwoPortSymbol))
         declared = before if isinstance(before, BranchSymbol) else before.branches[0]
         if len(declared.family.shape) != len(first.family.shape):  # an element and an array of one label
-            self.enter(symbol)
+            self.context.enter(symbol)
             return
         if isinstance(before, BranchSymbol) and isinstance(symbol, BranchSymbol):
-            self.scope.symbols[symbol.name] = _hull(before, symbol)
+            self.context.scope.symbols[symbol.name] = _hull(before, symbol)
         elif isinstance(before, TwoPortSymbol) and isinstance(symbol, TwoPortSymbol):
             one, two = (_hull(a, b) for a, b in zip(before.branches, symbol.branches, strict=True))
-            self.scope.symbols[symbol.name] = TwoPortSymbol(symbol.name, (one, two), before.place)
+            self.context.scope.symbols[symbol.name] = TwoPortSymbol(symbol.name, (one, two), before.place)
 
     def _later_law(
         self,
@@ -119,7 +124,7 @@ class Elements(Connections):
         kind: str | None,
         span: syntax.Span,
         ends: Ends,
-        s: syntax.Instance | syntax.Law,
+        s: syntax.InstanceStatement | syntax.LawStatement,
     ) -> None:
         """The law is resolved when all names are known."""
         loops, bound = self.resolver.loops, self.resolver.sight()
@@ -131,22 +136,26 @@ class Elements(Connections):
             # set-valued friction: sticks at zero and slips else; becomes an unknown with switches
             if ex.calls(law.law, "setsign"):
                 unit = si(own_variables(symbol, whole)[law.side].dimension or NONE)
-                node = friction.of_law(self, law, symbol.family.name, whole, loops, self.place(s.span), unit)
+                node = friction.of_law(
+                    self.context, law, symbol.family.name, whole, loops, self.context.place(s.span), unit
+                )
                 law = replace(law, law=node)
             self.resolver.laws[symbol.family.name] = law
             said = law.kind, law.side, law.law
-            branch = self.branch(symbol.family.name, symbol.domain, whole, loops, said, ends, self.place(s.span))
+            branch = self.branch(
+                symbol.family.name, symbol.domain, whole, loops, said, ends, self.context.place(s.span)
+            )
             self.parts.branches.append(branch)
 
         def resolve() -> None:
             # a law of a component's own branch has e, f, q, p in sight; a builtin's has those of its symbol
-            own = self.current.bound if not kind and symbol.family.name == self.current.path else None
+            own = self.context.current.bound if not kind and symbol.family.name == self.context.current.path else None
             own = own_variables(symbol, whole) if own is None else own
             self._hidden(value, own, symbol.name)
             with self.resolver.inside(loops, {**bound, **own}):
-                self.in_parts(part, span)
+                self.context.in_parts(part, span)
 
-        self.pending.append(Pending(self.current, span, resolve))
+        self.pending.append(Pending(self.context.current, span, resolve))
 
     def branch(
         self,
@@ -173,7 +182,7 @@ class Elements(Connections):
         at: tuple[Node, ...],
         law: tuple[str, str, syntax.Expr, syntax.Span],
         ends: tuple[Ends, Ends],
-        s: syntax.Instance,
+        s: syntax.InstanceStatement,
     ) -> None:
         """The ratio of a two-port is resolved when all names are known."""
         loops, bound = self.resolver.loops, self.resolver.sight()
@@ -182,7 +191,7 @@ class Elements(Connections):
 
         def part() -> None:
             ratio, loops = ratio_of(self.resolver, branches, whole, kind, side, value, span), self.resolver.loops
-            place = self.place(s.span)
+            place = self.context.place(s.span)
             # both branches have no law of their own: the coupling relates them
             for symbol, end in zip(branches, ends, strict=True):
                 name, domain, port = symbol.family.name, symbol.domain, ("port", None, None)
@@ -197,38 +206,38 @@ class Elements(Connections):
             own = {**own_variables(branches[0], whole, "1"), **own_variables(branches[1], whole, "2")}
             self._hidden(value, own, s.decl.name)
             with self.resolver.inside(loops, bound), self.resolver.bound(own):
-                self.in_parts(part, span)
+                self.context.in_parts(part, span)
 
-        self.pending.append(Pending(self.current, span, resolve))
+        self.pending.append(Pending(self.context.current, span, resolve))
 
     def _hidden(self, value: syntax.Expr, own: dict[str, Typed], name: str) -> None:
         """W101: an element's own variable hides an outer name in its law."""
-        hidden = {name for name in own if self.scope.symbols.get(name) is not None}
+        hidden = {name for name in own if self.context.scope.symbols.get(name) is not None}
         for node in walk(value) if hidden else ():
             if isinstance(node, syntax.Name) and node.name in hidden:
                 what = {"e": "effort", "f": "flow", "q": "displacement", "p": "momentum"}[node.name[0]]
                 message = f"'{node.name}' in the law of '{name}' is the element's own {what}; it hides the outer name"
-                self.report.warning(
-                    "W101", message, self.place(node.span), help="rename the outer one, or write it as a let"
+                self.context.report.warning(
+                    "W101", message, self.context.place(node.span), help="rename the outer one, or write it as a let"
                 )
 
-    def law(self, s: syntax.Law) -> None:
+    def law(self, s: syntax.LawStatement) -> None:
         """`law e = R*f`, `law b.e = ...`: the right edge of the diagram for a branch of the component."""
         name, letter = "", None
         if isinstance(s.left, syntax.Name):
             letter = s.left.name
         elif isinstance(s.left, syntax.Member) and isinstance(s.left.base, syntax.Name):
             name, letter = s.left.base.name, s.left.name
-        symbol = self.scope.symbols.get(name)
+        symbol = self.context.scope.symbols.get(name)
         if letter not in ("e", "f", "p", "q") or not isinstance(symbol, BranchSymbol):
             message = "the law must be solved for one port variable of its edge"
             raise self.resolver.fail("E303", message, s.left.span, help="'e = ...(f)'")
-        if name in self.current.laws:
-            related = (Related("the first law", self.current.laws[name]),)
-            message = f"branch '{name or self.current.path}' has two laws"
+        if name in self.context.current.laws:
+            related = (Related("the first law", self.context.current.laws[name]),)
+            message = f"branch '{name or self.context.current.path}' has two laws"
             raise self.resolver.fail("E305", message, s.span, related=related)
-        self.current.laws[name] = self.place(s.span)
-        self._later_law(symbol, (), letter, s.right, None, s.span, self.current.ends[name], s)
+        self.context.current.laws[name] = self.context.place(s.span)
+        self._later_law(symbol, (), letter, s.right, None, s.span, self.context.current.ends[name], s)
 
     def lawless(self, space: Space) -> None:
         """Branches without a law stand in energies and constraints; E306 where they stand in nothing."""
@@ -251,4 +260,4 @@ def _hull(a: BranchSymbol, b: BranchSymbol) -> BranchSymbol:
         (ex.call("min", first, other), ex.call("max", last, end))
         for (first, last), (other, end) in zip(a.family.shape, b.family.shape, strict=True)
     )
-    return BranchSymbol(a.name, Family(a.family.name, a.family.prefix, a.family.around, shape), a.domain, a.place)
+    return BranchSymbol(a.name, NameFamily(a.family.name, a.family.prefix, a.family.around, shape), a.domain, a.place)

@@ -20,7 +20,7 @@ class Body:
 
     def __init__(self, statements: Iterable[Nested]) -> None:
         self.statements = tuple(statements)
-        self.order: tuple[tuple[syntax.Param, tuple[syntax.For, ...]], ...] | None = None
+        self.order: tuple[tuple[syntax.ParamStatement, tuple[syntax.ForStatement, ...]], ...] | None = None
         self._head: Interface | None = None
         self._kinds: dict[Kinds, tuple[Nested, ...]] = {}
         self._around: dict[Kinds, tuple[Nested, ...]] = {}
@@ -54,22 +54,24 @@ class Interface:
     """What a component asks of its user: parameters, inputs, ports, branches; generic: whether units have variables."""
 
     def __init__(self, body: Body) -> None:
-        self.parameters: dict[str, syntax.Param] = {}
-        self.inputs: dict[str, syntax.Input] = {}
-        self.ports: dict[str, syntax.Port] = {}
-        self.branches: dict[str, syntax.Branch] = {}
+        self.parameters: dict[str, syntax.ParamStatement] = {}
+        self.inputs: dict[str, syntax.InputStatement] = {}
+        self.ports: dict[str, syntax.PortStatement] = {}
+        self.branches: dict[str, syntax.BranchStatement] = {}
         # what an instance may give or connect, by name
-        for statement, _ in body.statements_of((syntax.Param, syntax.Input, syntax.Port, syntax.Branch)):
+        for statement, _ in body.statements_of(
+            (syntax.ParamStatement, syntax.InputStatement, syntax.PortStatement, syntax.BranchStatement)
+        ):
             match statement:
-                case syntax.Param():
+                case syntax.ParamStatement():
                     self.parameters[statement.decl.name] = statement
-                case syntax.Input():
+                case syntax.InputStatement():
                     self.inputs[statement.decl.name] = statement
                 # `port a, b: electrical` declares several
-                case syntax.Port():
+                case syntax.PortStatement():
                     self.ports |= dict.fromkeys((d.name for d in statement.decls), statement)
                 # a branch without a name is that of the component itself
-                case syntax.Branch():
+                case syntax.BranchStatement():
                     self.branches |= dict.fromkeys(
                         (d.name for d in statement.decls) if statement.decls else ("",), statement
                     )

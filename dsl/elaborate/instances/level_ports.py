@@ -15,7 +15,10 @@ Visible = dict[tuple[str, str], str]
 
 
 def level_ports(
-    name: str, levels: Mapping[str, tuple[syntax.Level, Sequence[syntax.Statement]]], source: SourceText, report: Report
+    name: str,
+    levels: Mapping[str, tuple[syntax.LevelStatement, Sequence[syntax.Statement]]],
+    source: SourceText,
+    report: Report,
 ) -> None:
     """Compare the levels of a component; each is given with all its statements, inherited ones included."""
     shown = {level: _visible(body) for level, (_, body) in levels.items()}
@@ -47,11 +50,11 @@ def _visible(body: Iterable[syntax.Statement]) -> Visible:
     found: Visible = {}
     for statement in body:
         match statement:
-            case syntax.Port():
+            case syntax.PortStatement():
                 found |= {("port", d.name): statement.domain.name for d in statement.decls}
-            case syntax.Branch():
+            case syntax.BranchStatement():
                 names = [d.name for d in statement.decls] or [""]
                 found |= {("branch", name): statement.domain.name for name in names}
-            case syntax.Input():
+            case syntax.InputStatement():
                 found["input", statement.decl.name] = statement.unit.text
     return found

@@ -17,16 +17,16 @@ if TYPE_CHECKING:
 
 
 def choose_level(
-    frame: Instances, component: ComponentSymbol, s: syntax.Instance, path: str
+    frame: Instances, component: ComponentSymbol, s: syntax.InstanceStatement, path: str
 ) -> tuple[str | None, tuple[syntax.Statement, ...]]:
     """Name of the level and the statements of base and level: the scene's choice, the instance's, the default."""
-    levels = {b.name.name: b for b in component.body if isinstance(b, syntax.Level)}
-    base = tuple(b for b in component.body if not isinstance(b, syntax.Level))
+    levels = {b.name.name: b for b in component.body if isinstance(b, syntax.LevelStatement)}
+    base = tuple(b for b in component.body if not isinstance(b, syntax.LevelStatement))
     # by the scene (`level motor = thermal`) or the command line
     chosen, place = frame.levels.get(path, (None, None))
     # by the instance: `M: motor.thermal(...)`
     if chosen is None and len(s.component.names) > 1:
-        chosen, place = s.component.names[1], frame.place(s.component.span)
+        chosen, place = s.component.names[1], frame.context.place(s.component.span)
     free = chosen is None
     # by the component: `level simple default { ... }`
     if chosen is None:
@@ -43,13 +43,13 @@ def choose_level(
         message = f"no level '{chosen}'; '{component.name}' has {', '.join(levels) or 'none'}"
         near = nearest(chosen, levels)
         remedy = f"nearest: '{near}'" if near else None if levels else "leave the level out"
-        frame.report.error("E802", message, place or frame.place(s.component.span), help=remedy)
+        frame.context.report.error("E802", message, place or frame.context.place(s.component.span), help=remedy)
         raise Failed
     if len(levels) > 1:
         frame.choices[path] = LevelChoice(path, chosen, tuple(levels), free)
     bodies = {name: _inherit_statements(frame, component, levels, level, ()) for name, level in levels.items()}
     described = {name: (level, bodies[name]) for name, level in levels.items()}
-    level_ports(component.name, described, component.source, frame.report)
+    level_ports(component.name, described, component.source, frame.context.report)
     return chosen, (*base, *bodies[chosen])
 
 
@@ -57,7 +57,7 @@ def elsewhere(component: ComponentSymbol, chosen: str | None) -> dict[str, str]:
     """Names that other levels than the chosen one declare, with the first of these levels."""
     found: dict[str, str] = {}
     for level in component.body:
-        if isinstance(level, syntax.Level) and level.name.name != chosen:
+        if isinstance(level, syntax.LevelStatement) and level.name.name != chosen:
             for statement in level.body:
                 for decl in getattr(statement, "decls", (getattr(statement, "decl", None),)):
                     if decl is not None:
@@ -68,8 +68,8 @@ def elsewhere(component: ComponentSymbol, chosen: str | None) -> dict[str, str]:
 def _inherit_statements(
     frame: Instances,
     component: ComponentSymbol,
-    levels: dict[str, syntax.Level],
-    level: syntax.Level,
+    levels: dict[str, syntax.LevelStatement],
+    level: syntax.LevelStatement,
     chain: tuple[str, ...],
 ) -> tuple[syntax.Statement, ...]:
     """A level's statements; those of the level that it extends where it has no statement of the same label."""
@@ -80,7 +80,7 @@ def _inherit_statements(
     # `level a extends b`, where b is missing, is a itself, or extends a
     if parent is None or name in chain or name == level.name.name:
         message = f"level '{level.name.name}' extends '{name}', which is no other level of '{component.name}'"
-        frame.report.error("E802", message, Place(component.source, level.extends.span))
+        frame.context.report.error("E802", message, Place(component.source, level.extends.span))
         raise Failed
     inherited = _inherit_statements(frame, component, levels, parent, (*chain, level.name.name))
     own = {key: b for b in level.body if (key := _label(b)) is not None}
@@ -92,17 +92,17 @@ def _inherit_statements(
             kept.append(statement)
         # a replacement fits where the old one did: a resistor by another one-port, not by a let
         elif type(own[key]) is not type(statement) or not _alike(component, own[key], statement):
-            ports = isinstance(own[key], syntax.Instance) and isinstance(statement, syntax.Instance)
+            ports = isinstance(own[key], syntax.InstanceStatement) and isinstance(statement, syntax.InstanceStatement)
             what = "an element of other ports" if ports else "a statement of another kind"
             message = f"'{key}' of level '{level.name.name}' replaces {what}"
-            frame.report.error("E808", message, Place(component.source, own[key].span), help="a new label")
+            frame.context.report.error("E808", message, Place(component.source, own[key].span), help="a new label")
             raise Failed
     return (*kept, *level.body)
 
 
 def _alike(component: ComponentSymbol, one: syntax.Statement, other: syntax.Statement) -> bool:
     """Whether two statements are no elements, or elements with the same ports and domains."""
-    if not isinstance(one, syntax.Instance) or not isinstance(other, syntax.Instance):
+    if not isinstance(one, syntax.InstanceStatement) or not isinstance(other, syntax.InstanceStatement):
         return True
     first, second = (_ports(component, s) for s in (one, other))
     if isinstance(first, int) or isinstance(second, int):  # built in: of any domain
@@ -111,7 +111,7 @@ def _alike(component: ComponentSymbol, one: syntax.Statement, other: syntax.Stat
     return first is None or second is None or first == second
 
 
-def _ports(component: ComponentSymbol, s: syntax.Instance) -> dict[str, str] | int | None:
+def _ports(component: ComponentSymbol, s: syntax.InstanceStatement) -> dict[str, str] | int | None:
     """Domains of an element's ports and branches by their names, "" the one that has none; how many branches a built-in
     element has; None of what nobody declares.
     """
@@ -123,7 +123,7 @@ def _ports(component: ComponentSymbol, s: syntax.Instance) -> dict[str, str] | i
         return None
     found: dict[str, str] = {}
     for b in symbol.body:
-        if isinstance(b, (syntax.Port, syntax.Branch)):
+        if isinstance(b, (syntax.PortStatement, syntax.BranchStatement)):
             found |= {decl.name: b.domain.name for decl in b.decls} or {"": b.domain.name}
     return found
 
@@ -132,7 +132,15 @@ def _label(statement: syntax.Statement) -> str | None:
     """The label under which a statement can be replaced."""
     if isinstance(
         statement,
-        (syntax.Instance, syntax.Param, syntax.Let, syntax.Output, syntax.Quasi, syntax.Constraint, syntax.Input),
+        (
+            syntax.InstanceStatement,
+            syntax.ParamStatement,
+            syntax.LetStatement,
+            syntax.OutputStatement,
+            syntax.QuasiStatement,
+            syntax.ConstraintStatement,
+            syntax.InputStatement,
+        ),
     ):
         return statement.decl.name
     return None

@@ -26,8 +26,8 @@ from sysdyn.dsl.names.symbols import (
     ComponentSymbol,
     DomainSymbol,
     End,
-    Family,
     InstanceSymbol,
+    NameFamily,
     NodeSymbol,
     ParameterSymbol,
     Scope,
@@ -45,11 +45,11 @@ if TYPE_CHECKING:
 
 _NOWHERE: Mapping[str, str] = {}
 _NOTHING: dict[str, Typed] = {}
-_KINDS = {syntax.Param, syntax.Branch, syntax.Law, syntax.Require}
+_KINDS = {syntax.ParamStatement, syntax.BranchStatement, syntax.LawStatement, syntax.RequireStatement}
 
 
 @dataclass(frozen=True, slots=True)
-class Held:
+class MouldParameter:
     """A parameter: its unit and its place; value: where the instance does not give it."""
 
     name: str
@@ -63,8 +63,8 @@ class Mould:
     """What the instances of a body have in common that give the same parameters."""
 
     domain: DomainSymbol
-    parameters: tuple[Held, ...]
-    law: syntax.Law
+    parameters: tuple[MouldParameter, ...]
+    law: syntax.LawStatement
     fitting: set[tuple[str, str]] = field(default_factory=set)
     """Parameters with texts of units that fit."""
     branch: tuple[str, str, Cast, Place] | None = None
@@ -112,8 +112,8 @@ class Likeness(Space):
     def scope(self, _: Scope) -> None:
         """It follows from the mould."""
 
-    def _family(self, name: str) -> Family:
-        return Family(self.path + name, (), (), ())
+    def _family(self, name: str) -> NameFamily:
+        return NameFamily(self.path + name, (), (), ())
 
     @property
     def bound(self) -> dict[str, Typed]:
@@ -134,89 +134,95 @@ class Moulds:
         self._bodies: dict[int, tuple[ComponentSymbol, Body | None]] = {}  # by component
         self._moulds: dict[tuple[int, ...], Mould] = {}
 
-    def body(self, it: Instances, component: ComponentSymbol, s: syntax.Instance) -> Body | None:
+    def body(self, it: Instances, component: ComponentSymbol, s: syntax.InstanceStatement) -> Body | None:
         """The body of a component of which this instance may be cast."""
         if s.decl.indices or len(s.component.names) != 1 or it.levels:
             return None
         if id(component) not in self._bodies:
-            levels = any(isinstance(b, syntax.Level) for b in component.body)
+            levels = any(isinstance(b, syntax.LevelStatement) for b in component.body)
             body = None if levels else it.inside_of(component, None, component.body)
             self._bodies[id(component)] = component, body if body is not None and _plain(body) else None
         return self._bodies[id(component)][1]
 
     @staticmethod
-    def _key(s: syntax.Instance, body: Body, scope: Scope) -> tuple[int, ...]:
+    def _key(s: syntax.InstanceStatement, body: Body, scope: Scope) -> tuple[int, ...]:
         """Instances of one mould: of one body, with the same parameters given, where units mean the same."""
         return id(body), id(scope.declaring), *(id(body.head.parameters.get(a.name or "")) for a in s.args or ())
 
-    def keep(self, it: Instances, symbol: InstanceSymbol, s: syntax.Instance, body: Body, here: Space) -> None:
+    def keep(self, it: Instances, symbol: InstanceSymbol, s: syntax.InstanceStatement, body: Body, here: Space) -> None:
         """What an instance that has taken the whole way without a finding leaves for others."""
         given = {a.name or "": a.value for a in s.args or ()}
-        if len(symbol.spaces) != 1 or here.prefix or not all(isinstance(v, syntax.Quantity) for v in given.values()):
+        if (
+            len(symbol.spaces) != 1
+            or here.prefix
+            or not all(isinstance(v, syntax.QuantityLiteral) for v in given.values())
+        ):
             return
         space, key = symbol.spaces[0], self._key(s, body, here.scope)
         if key not in self._moulds:
             held = [_cast_parameter(it, space, name, given=name in given) for name in body.head.parameters]
-            branch, (law, _) = space.scope.symbols[""], body.statements_of(syntax.Law)[0]
+            branch, (law, _) = space.scope.symbols[""], body.statements_of(syntax.LawStatement)[0]
             assert isinstance(branch, BranchSymbol)
-            assert isinstance(law, syntax.Law)
+            assert isinstance(law, syntax.LawStatement)
             if None in held:
                 return
             self._moulds[key] = Mould(branch.domain, tuple(h for h in held if h is not None), law)
-        self._moulds[key].fitting |= {(n, v.unit.text) for n, v in given.items() if isinstance(v, syntax.Quantity)}
+        self._moulds[key].fitting |= {
+            (n, v.unit.text) for n, v in given.items() if isinstance(v, syntax.QuantityLiteral)
+        }
 
     def cast(
-        self, it: Instances, symbol: InstanceSymbol, s: syntax.Instance, component: ComponentSymbol, body: Body
+        self, it: Instances, symbol: InstanceSymbol, s: syntax.InstanceStatement, component: ComponentSymbol, body: Body
     ) -> bool:
         """Cast an instance where it stands, if there is a mould and nothing can be wrong with it."""
-        here, given = it.current, {a.name or "": a.value for a in s.args or ()}
+        here, given = it.context.current, {a.name or "": a.value for a in s.args or ()}
         mould = self._moulds.get(self._key(s, body, here.scope))
         # no mould of this shape; an array; loops around; coordinates, which a cast cannot read
-        if mould is None or symbol.spaces or here.prefix or not it.resolver.free or it.parts.coordinates:
+        if mould is None or symbol.spaces or here.prefix or not it.resolver.free or it.context.parts.coordinates:
             return False
         # casts have one branch, and none contains itself
         if len(s.connections) != 1 or component.name in (*here.chain, here.component):
             return False
         # each argument is a quantity in a unit that fitted before: nothing can be wrong with it
         for name, value in given.items():
-            if not isinstance(value, syntax.Quantity) or (name, value.unit.text) not in mould.fitting:
+            if not isinstance(value, syntax.QuantityLiteral) or (name, value.unit.text) not in mould.fitting:
                 return False
-        ends = _between(it.scope, s.connections[0], mould.domain)
+        ends = _between(it.context.scope, s.connections[0], mould.domain)
         if ends is None or len(given) != len(s.args or ()):
             return False
         charge(it, s, component)
         values = {name: it.resolver.scalar(value).node for name, value in given.items()}
         path = f"{here.path}.{s.decl.name}" if here.path else s.decl.name
-        space = Likeness(here, component, path, it.place(s.decl.span), mould, ends)
+        space = Likeness(here, component, path, it.context.place(s.decl.span), mould, ends)
         # the value that the instance gives, or the formula of the component in its names
         for held in mould.parameters:
             name = f"{path}.{held.name}"
             node = values[held.name] if held.value is None else held.value.under(path)
-            it.parts.parameters[name] = Parameter(name, (), held.unit, (node,), (), held.place)
+            it.context.parts.parameters[name] = Parameter(name, (), held.unit, (node,), (), held.place)
         symbol.spaces.append(space)
         it.bodies.append((space, body))
         return True
 
 
-def charge(it: Instances, s: syntax.Instance, component: ComponentSymbol) -> None:
+def charge(it: Instances, s: syntax.InstanceStatement, component: ComponentSymbol) -> None:
     """An instance counts, whichever way it takes."""
     try:
-        budget.check_depth(len(it.current.chain), "components are")
+        budget.check_depth(len(it.context.current.chain), "components are")
         budget.unfold(budget.INSTANCE, f"instances of component '{component.name}'")
     except budget.SpentError as spent:
-        spent.place = spent.place or it.place(s.span)
+        spent.place = spent.place or it.context.place(s.span)
         raise
 
 
-def _cast_parameter(it: Instances, space: Space, name: str, *, given: bool) -> Held | None:
+def _cast_parameter(it: Instances, space: Space, name: str, *, given: bool) -> MouldParameter | None:
     """A parameter as an instance has it; None where another may have it otherwise."""
-    parameter, symbol = it.parts.parameters.get(f"{space.path}.{name}"), space.scope.symbols.get(name)
+    parameter, symbol = it.context.parts.parameters.get(f"{space.path}.{name}"), space.scope.symbols.get(name)
     if parameter is None or not isinstance(symbol, ParameterSymbol) or symbol.truth:
         return None
     value = None if given else cast_of(parameter.values[0], space.path)
     if value is None and not given:
         return None
-    return Held(name, parameter.unit, parameter.place, value)
+    return MouldParameter(name, parameter.unit, parameter.place, value)
 
 
 def law_of_cast(it: Elaborator, space: Likeness) -> None:
@@ -226,13 +232,13 @@ def law_of_cast(it: Elaborator, space: Likeness) -> None:
         kind, side, law, place = mould.branch
         node, ends = law.under(path), space.ends[""]
         space.laws[""], it.resolver.laws[path] = place, LawOf(kind, side, node)
-        it.parts.branches.append(it.branch(path, mould.domain, (), (), (kind, side, node), ends, place))
+        it.parts.branches.append(it.element_builder.branch(path, mould.domain, (), (), (kind, side, node), ends, place))
         return
-    before, waiting = _learnt(it), len(it.pending)
-    with it.entering(space):
-        it.each([(mould.law, ())], it.law)
-        if len(it.pending) > waiting:
-            it.settle_law(it.pending.pop())
+    before, waiting = _learnt(it), len(it.element_builder.pending)
+    with it.context.entering(space):
+        it.context.each([(mould.law, ())], it.element_builder.law)
+        if len(it.element_builder.pending) > waiting:
+            it.settle_law(it.element_builder.pending.pop())
     branch = it.parts.branches[-1] if it.parts.branches else None
     if before == _learnt(it) and branch is not None and branch.name == path and branch.law is not None:
         found = cast_of(branch.law, path)
@@ -247,9 +253,9 @@ def required_of(it: Elaborator, space: Likeness, body: Body) -> None:
         for node, place, written in mould.required:
             it.parts.requirements.append(CastRequirement(node, space.path, place, written))
         return
-    before, first, said = _learnt(it), len(it.parts.requirements), body.statements_of(syntax.Require)
-    with it.entering(space):
-        it.each(said, it.require)
+    before, first, said = _learnt(it), len(it.parts.requirements), body.statements_of(syntax.RequireStatement)
+    with it.context.entering(space):
+        it.context.each(said, it.equations.require)
     own = it.parts.requirements[first:]
     casts = [(cast_of(r.condition, space.path), r.place, r.written) for r in own]
     sound = tuple((node, place, written) for node, place, written in casts if node is not None)
@@ -260,7 +266,7 @@ def required_of(it: Elaborator, space: Likeness, body: Body) -> None:
 def _learnt(it: Elaborator) -> tuple[int, ...]:
     """How much has been found beside what a statement becomes."""
     beside = it.resolver.uses, it.resolver.whole, it.resolver.quadratures, it.parts.drafts, it.parts.watched
-    return len(it.report), it.waiting, len(it.resolver.derived), *map(len, beside)
+    return len(it.context.report), it.context.waiting, len(it.resolver.derived), *map(len, beside)
 
 
 def _plain(body: Body) -> bool:
@@ -268,9 +274,9 @@ def _plain(body: Body) -> bool:
     said = [s for s, loops in body if not loops]
     if len(said) < len(body.statements) or not {type(s) for s in said} <= _KINDS or body.head.generic:
         return False
-    branches = [s for s in said if isinstance(s, syntax.Branch)]
-    laws = [s for s in said if isinstance(s, syntax.Law)]
-    arrays = any(s.decl.indices for s in said if isinstance(s, syntax.Param))
+    branches = [s for s in said if isinstance(s, syntax.BranchStatement)]
+    laws = [s for s in said if isinstance(s, syntax.LawStatement)]
+    arrays = any(s.decl.indices for s in said if isinstance(s, syntax.ParamStatement))
     own = len(laws) == 1 and isinstance(laws[0].left, syntax.Name)
     return own and not arrays and len(branches) == 1 and not branches[0].decls
 

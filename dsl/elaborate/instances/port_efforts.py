@@ -14,7 +14,7 @@ from sysdyn.dsl.elaborate.parts import NetworkBuilder
 from sysdyn.dsl.model import expression as ex
 from sysdyn.dsl.model.calculus import derivative, time_derivative
 from sysdyn.dsl.model.expression import Node
-from sysdyn.dsl.model.network import Constraint, Energy, Loop, Work
+from sysdyn.dsl.model.network import Constraint, EnergyTerm, Loop, VirtualWork
 from sysdyn.dsl.model.rewriting import sum_over_loops
 from sysdyn.dsl.names.reactions import reaction
 from sysdyn.dsl.names.symbols import End, Space
@@ -102,16 +102,16 @@ def _inside(name: str, loops: Sequence[Loop], space: Space) -> bool:
     return own and tuple(loops[: len(space.loops)]) == space.loops
 
 
-def _roots(s: Energy | Work | Constraint) -> Sequence[Node]:
-    return (s.on, s.effort) if isinstance(s, Work) else (s.expression,)
+def _roots(s: EnergyTerm | VirtualWork | Constraint) -> Sequence[Node]:
+    return (s.on, s.effort) if isinstance(s, VirtualWork) else (s.expression,)
 
 
 def _effort_of_statement(
-    s: Energy | Work | Constraint, q: Node, f: Node, jumps: dict[str, Place], *, rates: bool
+    s: EnergyTerm | VirtualWork | Constraint, q: Node, f: Node, jumps: dict[str, Place], *, rates: bool
 ) -> Node:
     """The effort that a statement asks of the node: it is taken from where it acts."""
     # delta W = F delta x delivers F
-    if isinstance(s, Work):
+    if isinstance(s, VirtualWork):
         return ex.neg(ex.mul(s.effort, derivative(s.on, q)))
     # a reaction: multiplier times the gradient; a gamma does no work
     if isinstance(s, Constraint):

@@ -26,7 +26,7 @@ Equation = tuple[dict[str, Fraction], Dimension, str]  # exponents of the variab
 
 def solve_units(
     frame: Instances,
-    s: syntax.Instance,
+    s: syntax.InstanceStatement,
     space: Space,
     head: Interface,
     arguments: dict[str, Argument],
@@ -57,7 +57,7 @@ def solve_units(
         space.scope.units[name] = Unit(dimension, Fraction(1), si_text(dimension))
 
 
-def _equation(unit: syntax.Unit, given: Dimension, name: str, space: Space) -> Equation:
+def _equation(unit: syntax.UnitExpression, given: Dimension, name: str, space: Space) -> Equation:
     """What a unit with variables says of their exponents, and the dimension left for them."""
     exponents: dict[str, Fraction] = {}
     rest = given
@@ -74,7 +74,7 @@ def _equation(unit: syntax.Unit, given: Dimension, name: str, space: Space) -> E
 
 def _solve_units(
     frame: Instances,
-    s: syntax.Instance,
+    s: syntax.InstanceStatement,
     names: set[str],
     equations: list[Equation],
     places: Mapping[str, Place | syntax.Span],

@@ -55,7 +55,7 @@ class Readable:
 
 
 @dataclass(frozen=True, slots=True)
-class Instance:
+class ListedInstance:
     """A component in the model: its path, component, levels and the one it has."""
 
     path: str
@@ -83,7 +83,7 @@ def readable(elaborator: Elaborator, known: Values) -> tuple[Readable, ...]:
     found += [_Candidate(f"audit.{m}", f"audit.{m}", "audit", "audit") for m in (*AUDIT, *sorted(pseudo))]
     expressions = _expressions([c.read for c in found])
     listed = []
-    with elaborator.entering(elaborator.space), elaborator.resolver.leniently():
+    with elaborator.context.entering(elaborator.space), elaborator.resolver.leniently():
         for candidate, (source, expression) in zip(found, expressions, strict=True):
             unit = _unit(elaborator, source, expression)
             if unit is not None:
@@ -91,15 +91,15 @@ def readable(elaborator: Elaborator, known: Values) -> tuple[Readable, ...]:
     return tuple(dict.fromkeys(listed))
 
 
-def instances(elaborator: Elaborator) -> tuple[Instance, ...]:
+def instances(elaborator: Elaborator) -> tuple[ListedInstance, ...]:
     """The components in the model, those inside others too; an array is one entry."""
-    found: dict[str, Instance] = {}
-    for space, _ in elaborator.bodies:
+    found: dict[str, ListedInstance] = {}
+    for space, _ in elaborator.instances.bodies:
         if space.path:
             component = space.file_scope.find(space.component)
             body = getattr(component, "body", ())
-            levels = tuple(s.name.name for s in body if isinstance(s, syntax.Level))
-            found.setdefault(space.path, Instance(space.path, space.component, levels, space.level))
+            levels = tuple(s.name.name for s in body if isinstance(s, syntax.LevelStatement))
+            found.setdefault(space.path, ListedInstance(space.path, space.component, levels, space.level))
     return tuple(found.values())
 
 
@@ -109,8 +109,8 @@ def _expressions(texts: list[str]) -> list[tuple[SourceText, syntax.Expr]]:
     for text in texts:
         source = SourceText("<list>", f"scene list of model {{\n  trace {text}\n}}\n")
         file, _ = parse(source)
-        (scene,) = (i for i in file.items if isinstance(i, syntax.Scene))
-        (trace,) = (s for s in scene.body if isinstance(s, syntax.Trace))
+        (scene,) = (i for i in file.items if isinstance(i, syntax.SceneDefinition))
+        (trace,) = (s for s in scene.body if isinstance(s, syntax.TraceStatement))
         found.append((source, trace.items[0].expr))
     return found
 
@@ -137,11 +137,11 @@ class _Walk:
     def __init__(self, elaborator: Elaborator, known: Values) -> None:
         self.discretes = elaborator.parts.discretes
         self.known = known
-        self.loops: dict[int, tuple[syntax.For, ...]] = {}
+        self.loops: dict[int, tuple[syntax.ForStatement, ...]] = {}
         """The loops around the declaration of a let or an output, by its symbol's identity."""
-        for space, body in elaborator.bodies:
+        for space, body in elaborator.instances.bodies:
             for statement, loops in body:
-                if isinstance(statement, (syntax.Let, syntax.Output)) and loops:
+                if isinstance(statement, (syntax.LetStatement, syntax.OutputStatement)) and loops:
                     symbol = space.scope.symbols.get(statement.decl.name)
                     self.loops[id(symbol)] = loops
 
@@ -220,7 +220,7 @@ class _Walk:
         return str(int(number)) if math.isfinite(number) else "1"
 
 
-def _ranges(loops: tuple[syntax.For, ...]) -> tuple[str, str]:
+def _ranges(loops: tuple[syntax.ForStatement, ...]) -> tuple[str, str]:
     """The indices of a let in loops: as shown, and those of its first element."""
     bounds = [(format_expression(loop.lower), format_expression(loop.upper)) for loop in loops]
     shown = ", ".join(f"{first}..{last}" for first, last in bounds)

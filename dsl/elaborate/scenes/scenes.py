@@ -27,7 +27,7 @@ from sysdyn.dsl.text.diagnostics import Place, Report, SourceText
 from sysdyn.dsl.tree import syntax
 from sysdyn.names import trace_name
 
-_Said = TypeVar("_Said", syntax.Set, syntax.Trace)
+_Said = TypeVar("_Said", syntax.SetStatement, syntax.TraceStatement)
 RESERVED = ("time", "audit", "parameters", "events", "derivatives")
 FORMULATIONS = ("lagrangian", "hamiltonian", "co_lagrangian", "co_hamiltonian", "kane", "co_kane", "auto")
 SOLVERS = ("auto", "bdf", "radau", "rosenbrock", "dopri", "energy", "euler")
@@ -43,7 +43,7 @@ class SceneReader:
     def __init__(self, elaborator: Elaborator) -> None:
         self.model = elaborator
         self.resolver = elaborator.resolver
-        self.report = elaborator.report
+        self.report = elaborator.context.report
         self.observations: list[Observation] = []
         self.given = Settings(elaborator)
         self._raw: dict[Node, str] = {}  # traced expression before its unit -> name
@@ -53,20 +53,20 @@ class SceneReader:
         self._ranged: list[str] = []
         self._targets: set[tuple[str, str]] = set()
 
-    def levels(self, scene: syntax.Scene) -> None:
+    def levels(self, scene: syntax.SceneDefinition) -> None:
         """The `level` statements and those that set inputs and sizes: before the model's instances are elaborated."""
-        self._each(scene, {syntax.SceneLevel: SceneReader.level, syntax.Set: SceneReader.set_input})
+        self._each(scene, {syntax.SceneLevelStatement: SceneReader.level, syntax.SetStatement: SceneReader.set_input})
 
-    def settings(self, scene: syntax.Scene) -> None:
+    def settings(self, scene: syntax.SceneDefinition) -> None:
         """The `set` statements on parameters: when those of instances are known."""
-        self._each(scene, {syntax.Set: SceneReader.set_parameter})
+        self._each(scene, {syntax.SetStatement: SceneReader.set_parameter})
 
-    def set_input(self, s: syntax.Set) -> None:
+    def set_input(self, s: syntax.SetStatement) -> None:
         """A `set` of an input of the model, or of what may be a size; others wait."""
         self.given.input(s)
         self.given.size(s)
 
-    def set_parameter(self, s: syntax.Set) -> None:
+    def set_parameter(self, s: syntax.SetStatement) -> None:
         """A `set` of a parameter or elements of one."""
         if self.resolver.source is self.model.source:  # of the command line the last one counts
             self._one("set", s.target)
@@ -77,16 +77,18 @@ class SceneReader:
         """Elements of parameters that were set."""
         return self.given.elements
 
-    def read(self, scene: syntax.Scene, place: Place) -> Scene:
+    def read(self, scene: syntax.SceneDefinition, place: Place) -> Scene:
         """Everything else of the scene."""
         self._each(scene, _STATEMENTS)
-        self._each(scene, {syntax.Accuracy: SceneReader._accuracy})  # names of traced quantities are known by now
+        self._each(
+            scene, {syntax.AccuracyStatement: SceneReader._accuracy}
+        )  # names of traced quantities are known by now
         return Scene(scene.name.name, place, **self._found)  # type: ignore[arg-type]
 
-    def _each(self, scene: syntax.Scene, table: dict[type, Callable[..., None]]) -> None:
-        with self.model.entering(self.model.space):
+    def _each(self, scene: syntax.SceneDefinition, table: dict[type, Callable[..., None]]) -> None:
+        with self.model.context.entering(self.model.space):
             for statement in scene.body:
-                if isinstance(statement, syntax.Broken):
+                if isinstance(statement, syntax.BrokenStatement):
                     self.model.space.scope.broken |= statement.names
                     self._lost = True
                 elif type(statement) in table:
@@ -94,7 +96,10 @@ class SceneReader:
 
     def command(self, source: SourceText, s: _Said, do: Callable[[SceneReader, _Said], None]) -> None:
         """A `--set` or `--outputs` of the command line."""
-        with self.model.entering(self.model.space), self.resolver.entering_scope(self.model.space.scope, source):
+        with (
+            self.model.context.entering(self.model.space),
+            self.resolver.entering_scope(self.model.space.scope, source),
+        ):
             self.carry_out(lambda statement: do(self, statement), s)
 
     def carry_out(self, do: Callable[..., None], statement: syntax.SceneStatement | syntax.TraceItem) -> None:
@@ -104,7 +109,7 @@ class SceneReader:
         except SeveralError as several:
             self.resolver.spread(several, statement.span)
         except Failed:
-            self._lost |= isinstance(statement, syntax.Trace | syntax.TraceItem)
+            self._lost |= isinstance(statement, syntax.TraceStatement | syntax.TraceItem)
 
     def _one(self, word: str, target: syntax.Expr) -> None:
         """What a scene gives to one target once."""
@@ -130,7 +135,7 @@ class SceneReader:
                 raise self.resolver.fail("E807", f"{what} depends on '{inner}': it must be a constant", expression.span)
         return node
 
-    def _time(self, s: syntax.Time) -> None:
+    def _time(self, s: syntax.TimeStatement) -> None:
         """Read `time START to STOP`: both finite instants [s], the end after the start (E912)."""
         start = self._constant(s.start, dim.TIME, f"the start '{self._text(s.start)}'")
         end = self._constant(s.stop, dim.TIME, f"the end '{self._text(s.stop)}'")
@@ -153,7 +158,7 @@ class SceneReader:
     def _text(self, e: syntax.Expr) -> str:
         return " ".join(self.resolver.source.text[e.span.start : e.span.end].split())[:40]
 
-    def _limit(self, s: syntax.Limit) -> None:
+    def _limit(self, s: syntax.LimitStatement) -> None:
         if s.name.name not in ("steps", "events"):
             raise self.resolver.fail(
                 "E113", f"there is no limit '{s.name.name}'", s.name.span, help="limit steps, limit events"
@@ -164,16 +169,16 @@ class SceneReader:
             raise self.resolver.fail("E106", f"the scene says 'limit {s.name.name}' twice", s.span)
         self._found["limits"] = (*before, (s.name.name, self._constant(s.value, NONE, "a limit")))
 
-    def _formulation(self, s: syntax.Formulation) -> None:
+    def _formulation(self, s: syntax.FormulationStatement) -> None:
         self._choice(s.name, FORMULATIONS, "formulation")
         self._once("formulation", s.name.name, s.span)
         self._found["formulation_place"] = self.resolver.place(s.span)
 
-    def _redundancy(self, s: syntax.Redundancy) -> None:
+    def _redundancy(self, s: syntax.RedundancyStatement) -> None:
         self._choice(s.name, REDUNDANCY, "redundancy")
         self._once("redundancy", s.name.name, s.span)
 
-    def _solver(self, s: syntax.Solver) -> None:
+    def _solver(self, s: syntax.SolverStatement) -> None:
         """The method and its options."""
         self._choice(s.name, SOLVERS, "solver")
         self._once("solver", s.name.name, s.span)
@@ -218,18 +223,18 @@ class SceneReader:
     # -- traces --------------------------------------------------------------------------------------------
 
     def only(
-        self, wanted: Sequence[str], read: Callable[[str], tuple[SourceText, syntax.Trace] | None]
-    ) -> list[tuple[SourceText, syntax.Trace]]:
+        self, wanted: Sequence[str], read: Callable[[str], tuple[SourceText, syntax.TraceStatement] | None]
+    ) -> list[tuple[SourceText, syntax.TraceStatement]]:
         """Forget what is traced but for the wanted names; statements for those that are not traced yet."""
         known = {o.name: o for o in self.observations}
         self.observations = [known[name] for name in wanted if name in known]
         return [found for name in wanted if name not in known and (found := read(name)) is not None]
 
-    def trace(self, s: syntax.Trace) -> None:
+    def trace(self, s: syntax.TraceStatement) -> None:
         """`trace`: quantities by name, and how often."""
         if s.every is not None:
             what = f"the interval '{self._text(s.every)}' of a trace"
-            frequency = s.every if isinstance(s.every, syntax.Quantity) and s.every.value > 0.0 else None
+            frequency = s.every if isinstance(s.every, syntax.QuantityLiteral) and s.every.value > 0.0 else None
             if frequency is not None and frequency.unit.text in ("Hz", "kHz", "MHz", "1/s", "s^-1"):
                 help_ = f"every 1/({self._text(s.every)}): the time between two rows"
                 raise self.resolver.fail("E208", f"{what} is a frequency, wants s", s.every.span, help=help_)
@@ -293,7 +298,7 @@ class SceneReader:
             raise self.resolver.fail("E208", message, item.unit.span, help=help_)
         return unit
 
-    def _accuracy(self, s: syntax.Accuracy) -> None:
+    def _accuracy(self, s: syntax.AccuracyStatement) -> None:
         """What a run promises, and of which quantities."""
         value = self._constant(s.value, NONE, "the accuracy")
         # for all that is traced
@@ -354,34 +359,34 @@ class SceneReader:
 
     # -- the rest ------------------------------------------------------------------------------------------
 
-    def _init(self, s: syntax.Init) -> None:
-        self.model.initial(s, override=True)
+    def _init(self, s: syntax.InitStatement) -> None:
+        self.model.equations.initial(s, override=True)
 
-    def _expect(self, s: syntax.Expect) -> None:
-        self.model.expect(s)
+    def _expect(self, s: syntax.ExpectStatement) -> None:
+        self.model.equations.expect(s)
 
-    def _golden(self, s: syntax.Golden) -> None:
-        self.model.golden(s)
+    def _golden(self, s: syntax.GoldenStatement) -> None:
+        self.model.equations.golden(s)
 
-    def level(self, s: syntax.SceneLevel) -> None:
+    def level(self, s: syntax.SceneLevelStatement) -> None:
         """`level ref = name`: before the model's instances are elaborated."""
         self._one("level", s.target)
         text = " ".join(self.resolver.source.text[s.target.span.start : s.target.span.end].split())
-        self.model.levels[text.replace(" ", "")] = (s.level.name, self.resolver.place(s.span))
+        self.model.instances.levels[text.replace(" ", "")] = (s.level.name, self.resolver.place(s.span))
 
-    def _when(self, s: syntax.When) -> None:
-        events.when(self.model, s)
+    def _when(self, s: syntax.WhenStatement) -> None:
+        events.when(self.model.context, s)
 
 
 _STATEMENTS: dict[type, Callable[..., None]] = {
-    syntax.Time: SceneReader._time,
-    syntax.Trace: SceneReader.trace,
-    syntax.Formulation: SceneReader._formulation,
-    syntax.Solver: SceneReader._solver,
-    syntax.Redundancy: SceneReader._redundancy,
-    syntax.Limit: SceneReader._limit,
-    syntax.Init: SceneReader._init,
-    syntax.Expect: SceneReader._expect,
-    syntax.Golden: SceneReader._golden,
-    syntax.When: SceneReader._when,
+    syntax.TimeStatement: SceneReader._time,
+    syntax.TraceStatement: SceneReader.trace,
+    syntax.FormulationStatement: SceneReader._formulation,
+    syntax.SolverStatement: SceneReader._solver,
+    syntax.RedundancyStatement: SceneReader._redundancy,
+    syntax.LimitStatement: SceneReader._limit,
+    syntax.InitStatement: SceneReader._init,
+    syntax.ExpectStatement: SceneReader._expect,
+    syntax.GoldenStatement: SceneReader._golden,
+    syntax.WhenStatement: SceneReader._when,
 }

@@ -11,7 +11,7 @@ from dataclasses import replace
 
 from sysdyn.dsl.elaborate.elaborate import Elaborator
 from sysdyn.dsl.elaborate.scenes.slices import bound_of, each_of, ranges_of
-from sysdyn.dsl.elaborate.statements.inputs import Given, bare, path_of
+from sysdyn.dsl.elaborate.statements.inputs import GivenInput, bare, path_of
 from sysdyn.dsl.model import dimensions as dim
 from sysdyn.dsl.model import expression as ex
 from sysdyn.dsl.model.expression import Node
@@ -42,24 +42,24 @@ class Settings:
         self.resolver = elaborator.resolver
         self.elements: list[ElementSetting] = []
 
-    def input(self, s: syntax.Set) -> None:
+    def input(self, s: syntax.SetStatement) -> None:
         """A `set` of an input of the model, or of a component's by its path: the last one counts."""
         if isinstance(s.target, syntax.Name) and s.target.name in self.model.parts.inputs:
             self._input(s.target.name, *self.model.parts.inputs[s.target.name], s)
         elif (path := path_of(s.target)) is not None:
-            self.model.given_inputs[path] = Given(s, self.resolver.source)
+            self.model.inputs.given_inputs[path] = GivenInput(s, self.resolver.source)
 
-    def size(self, s: syntax.Set) -> None:
+    def size(self, s: syntax.SetStatement) -> None:
         """A `set` of a parameter of the model to a number, which may be a size that instances ask for."""
-        symbol = self.model.scope.symbols.get(s.target.name) if isinstance(s.target, syntax.Name) else None
+        symbol = self.model.context.scope.symbols.get(s.target.name) if isinstance(s.target, syntax.Name) else None
         if isinstance(symbol, ParameterSymbol) and not symbol.shape and isinstance(s.value, syntax.Number):
             self.parameter(s)
 
-    def parameter(self, s: syntax.Set) -> None:
+    def parameter(self, s: syntax.SetStatement) -> None:
         """`set ref = value` of a parameter or an element of one, no input; paths lead into instances."""
         if isinstance(s.target, syntax.Name) and s.target.name in self.model.parts.inputs:
             return
-        if path_of(s.target) in self.model.taken_inputs:
+        if path_of(s.target) in self.model.inputs.taken_inputs:
             return
         path = s.target.base if isinstance(s.target, syntax.Item) else s.target
         # `set cell[1..3].R = 1 ohm`: one setting for each
@@ -111,19 +111,21 @@ class Settings:
             help_ = f"an input of the model there: input u: ..., and {symbol.name} = u"
         raise self.resolver.fail("E910", message, s.target.span, help=help_)
 
-    def _input(self, name: str, unit: Unit, place: Place, s: syntax.Set) -> None:
-        value = bare(self.model, s.value, unit.dimension)
+    def _input(self, name: str, unit: Unit, place: Place, s: syntax.SetStatement) -> None:
+        value = bare(self.model.inputs, s.value, unit.dimension)
         self.model.parts.parameters.pop(name, None)
         space = self.model.space
         shape = getattr(space.scope.symbols[name], "shape", ())
         if self.resolver.source is not space.source:  # the command line has a text of its own
             space = Space("", space.scope, space.file_scope, self.resolver.source)
-        self.model.define_input(Definition(name, "input", value, (), unit.dimension, space, place, s.span, shape=shape))
+        self.model.inputs.define_input(
+            Definition(name, "input", value, (), unit.dimension, space, place, s.span, shape=shape)
+        )
 
-    def _parameter(self, symbol: ParameterSymbol, found: Located, s: syntax.Set) -> None:
+    def _parameter(self, symbol: ParameterSymbol, found: Located, s: syntax.SetStatement) -> None:
         """A parameter, or elements of one, with its new value."""
         parameter = self.model.parts.parameters[symbol.family.name]
-        value = self.resolver.resolve(bare(self.model, s.value, symbol.dimension or NONE))
+        value = self.resolver.resolve(bare(self.model.inputs, s.value, symbol.dimension or NONE))
         items = value.items if isinstance(value, Vector) else (value,)
         for item in items:
             self._check_setting(symbol, item, s)
@@ -134,7 +136,7 @@ class Settings:
             at += [self._chosen(symbol, i) for i in found.indices]
         if around and not found.indices:  # of a component in an array: each element
             bounds = (
-                [self.model.with_instance_parameters(ex.substitute(b, found.change)) for b in pair]
+                [self.model.context.with_instance_parameters(ex.substitute(b, found.change)) for b in pair]
                 for pair in symbol.shape
             )
             at += [tuple(ex.const(float(k)) for k in range(round(a.data), round(b.data) + 1)) for a, b in bounds
@@ -156,7 +158,7 @@ class Settings:
             self.elements += [ElementSetting(parameter.name, a, n, place) for a, n in zip(elements, given, strict=True)]
             return
         # the whole parameter: a number for all, or a list of its length
-        if not self.model.fills(value, parameter.shape):
+        if not self.model.context.fills(value, parameter.shape):
             message = f"'{symbol.name}' is given {len(items)} values, which do not fit its shape"
             raise self.resolver.fail("E805", message, s.value.span)
         if self.resolver.source is not self.model.source:  # the command line wins over the scene's elements
@@ -177,7 +179,7 @@ class Settings:
         first, last = (bound_of(self.model, bound) for bound in (index.lower, index.upper))
         return tuple(ex.const(float(k)) for k in range(first, last + 1))
 
-    def _check_setting(self, symbol: ParameterSymbol, value: Typed, s: syntax.Set) -> None:
+    def _check_setting(self, symbol: ParameterSymbol, value: Typed, s: syntax.SetStatement) -> None:
         """E207: a setting is of the kind and the dimension of its parameter."""
         # `set on = 3`
         if value.truth != symbol.truth:

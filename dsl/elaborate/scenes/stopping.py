@@ -12,7 +12,7 @@ from dataclasses import replace
 
 from sysdyn.dsl.elaborate.elaborate import Elaborator
 from sysdyn.dsl.model import expression as ex
-from sysdyn.dsl.model.network import Dynamic, Initial, Network, Observation, State
+from sysdyn.dsl.model.network import Dynamic, InitialCondition, Network, Observation, State
 from sysdyn.dsl.model.rewriting import everywhere, expressions
 from sysdyn.dsl.model.units import NONE, si
 from sysdyn.dsl.text.diagnostics import Place
@@ -91,7 +91,7 @@ def _add_integral(elaborator: Elaborator, rate: ex.Node, place: Place) -> None:
     parts.states.append(State(name, (), si(NONE), place, measured=True))
     parts.dynamics.append(Dynamic(state, rate, (), place))
     parts.given.add(name)
-    parts.initials.append(Initial(state, ex.const(0.0), True, (), place))
+    parts.initials.append(InitialCondition(state, ex.const(0.0), True, (), place))
     parts.watched.append(Observation(name, state, si(NONE), name, place, stored=False))
 
 

@@ -75,7 +75,7 @@ class EventDraft:
 # -- discrete variables ------------------------------------------------------------------------------------
 
 
-def discrete(frame: ElaborationContext, s: syntax.Discrete) -> None:
+def discrete(frame: ElaborationContext, s: syntax.DiscreteStatement) -> None:
     """`discrete g = 1`: a parameter that events assign."""
     decl, resolver = s.decl, frame.resolver
     own = resolver.loops[len(frame.current.loops) :]
@@ -117,7 +117,7 @@ def _number(value: Typed) -> Node:
 # -- when, every -------------------------------------------------------------------------------------------
 
 
-def when(frame: ElaborationContext, s: syntax.When) -> None:
+def when(frame: ElaborationContext, s: syntax.WhenStatement) -> None:
     """`when condition { target := value }`."""
     resolver = frame.resolver
     condition = resolver.condition(s.condition)
@@ -148,7 +148,7 @@ def _reads_input(frame: ElaborationContext, condition: syntax.Expr) -> bool:
     return False
 
 
-def every(frame: ElaborationContext, s: syntax.Every) -> None:
+def every(frame: ElaborationContext, s: syntax.EveryStatement) -> None:
     """`every period { target := value }`."""
     message = "the period of 'every' is in {}, wants s"
     value = frame.resolver.scalar(s.period)
@@ -214,11 +214,11 @@ def watch(frame: ElaborationContext, node: Node, dimension: Dimension | None, pl
     return name
 
 
-def _actions(frame: ElaborationContext, actions: tuple[syntax.Action, ...]) -> tuple[Assigned, ...]:
+def _actions(frame: ElaborationContext, actions: tuple[syntax.ActionStatement, ...]) -> tuple[Assigned, ...]:
     """Assignments of an event, each to a state, a discrete or a flow, of its kind and dimension."""
     found: list[Assigned] = []
     for action in actions:
-        if isinstance(action, syntax.Broken):  # its syntax was complained of
+        if isinstance(action, syntax.BrokenStatement):  # its syntax was complained of
             continue
         target, truth = _target(frame, action)
         value = frame.resolver.scalar_or_truth(action.value)
@@ -240,7 +240,7 @@ def _actions(frame: ElaborationContext, actions: tuple[syntax.Action, ...]) -> t
     return tuple(found)
 
 
-def _target(frame: ElaborationContext, action: syntax.Action) -> tuple[Typed, bool]:
+def _target(frame: ElaborationContext, action: syntax.ActionStatement) -> tuple[Typed, bool]:
     """What an action assigns: the param of a discrete variable, a state, a flow; and whether it is a condition."""
     value = frame.resolver.scalar_or_truth(action.target)
     node = value.node
@@ -283,7 +283,7 @@ def _instead(frame: ElaborationContext, node: Node) -> str:
 # -- constraints that hold at times --------------------------------------------------------------------------
 
 
-def guard_constraint(frame: ElaborationContext, s: syntax.Constraint, constraint: Constraint) -> Constraint:
+def guard_constraint(frame: ElaborationContext, s: syntax.ConstraintStatement, constraint: Constraint) -> Constraint:
     """The constraint as a row; where it holds at times only, the switch that says when."""
     guard = restitution = None
     # `while c` says when it holds, `restitution e` how it bounces

@@ -10,8 +10,8 @@ from __future__ import annotations
 from dataclasses import replace
 
 from sysdyn.dsl.elaborate.files import FileScope
-from sysdyn.dsl.elaborate.instances.elements import Elements
 from sysdyn.dsl.elaborate.instances.head import Interface
+from sysdyn.dsl.elaborate.parts import ElaborationContext
 from sysdyn.dsl.model import dimensions as dim
 from sysdyn.dsl.model import expression as ex
 from sysdyn.dsl.model.network import Parameter, Shape
@@ -19,53 +19,61 @@ from sysdyn.dsl.model.units import Dimension, Unit, si
 from sysdyn.dsl.names.calls import walk
 from sysdyn.dsl.names.failures import Failed
 from sysdyn.dsl.names.symbols import Definition, ParameterSymbol, Space, Vector
-from sysdyn.dsl.text.diagnostics import Report
 from sysdyn.dsl.text.source import SourceText
 from sysdyn.dsl.tree import syntax
 from sysdyn.values import dataclass
 
 
 @dataclass(frozen=True, slots=True)
-class Given:
+class GivenInput:
     """What a scene or the command line gives to the input of a component."""
 
-    statement: syntax.Set
+    statement: syntax.SetStatement
     source: SourceText
 
 
-class Inputs(Elements):
+class Inputs:
     """Brings inputs into scope."""
 
-    def __init__(self, report: Report) -> None:
-        super().__init__(report)
-        self.space: Space  # of the model
-        self.files: FileScope
-        self.given_inputs: dict[str, Given] = {}  # by path
+    def __init__(self, context: ElaborationContext, files: FileScope, space: Space) -> None:
+        self.context, self.resolver, self.parts = context, context.resolver, context.parts
+        self.files, self.space = files, space  # of the model
+        self.given_inputs: dict[str, GivenInput] = {}  # by path
         self.taken_inputs: set[str] = set()  # those of them that were found
         self.moved: frozenset[str] = frozenset()  # names and paths of inputs that an analysis moves
 
-    def model_input(self, statement: syntax.Input) -> None:
+    def model_input(self, statement: syntax.InputStatement) -> None:
         """An input of the model itself: a scene may set it."""
         decl = statement.decl
-        unit = self.unit(statement.unit)
-        place = self.place(decl.span)
-        shape = self.shape(decl)
+        unit = self.context.unit(statement.unit)
+        place = self.context.place(decl.span)
+        shape = self.context.shape(decl)
         self.parts.inputs[decl.name] = (unit, place)
         self.resolver.inputs.add(decl.name)
         if statement.value is None:
-            self.enter(ParameterSymbol(decl.name, self.current.family(decl.name, shape), unit.dimension, False, place))
+            self.context.enter(
+                ParameterSymbol(decl.name, self.context.current.family(decl.name, shape), unit.dimension, False, place)
+            )
             self.parts.parameters[decl.name] = Parameter(decl.name, shape, unit, (), (), place)
         else:
             definition = Definition(
-                decl.name, "input", statement.value, (), unit.dimension, self.current, place, decl.span, shape=shape
+                decl.name,
+                "input",
+                statement.value,
+                (),
+                unit.dimension,
+                self.context.current,
+                place,
+                decl.span,
+                shape=shape,
             )
-            self.enter(definition)
+            self.context.enter(definition)
             self.define_input(definition)
 
     def define_input(self, definition: Definition) -> None:
         """Give an input its value; one that holds a constant is a run-time value: setting it compiles nothing."""
         name = definition.name
-        self._define(definition, self.parts.inputs[name][0], self.current)
+        self._define(definition, self.parts.inputs[name][0], self.context.current)
 
     def _define(self, definition: Definition, unit: Unit, inside: Space) -> None:
         """An input of the model or of the component `inside`; what it is given is read where the definition says."""
@@ -81,7 +89,7 @@ class Inputs(Elements):
                 found = self.resolver.resolve(definition.expression) if shape else None
                 written = definition.expression
                 items = found.items if isinstance(found, Vector) else (self.resolver.scalar(written),)
-                if not self.fills(found, shape):
+                if not self.context.fills(found, shape):
                     what = f"input '{name}' has {len(items)} values, which do not fit its shape"
                     raise self.resolver.fail("E805", what, written.span)
                 values = tuple(self.resolver.fitting(i, written, unit.dimension, "E207", message) for i in items)
@@ -108,7 +116,7 @@ class Inputs(Elements):
                     return False
                 if isinstance(node, syntax.Name) and node.name not in seen:
                     seen.add(node.name)
-                    symbol = self.scope.find(node.name)
+                    symbol = self.context.scope.find(node.name)
                     # `pi` and `inf` of the language
                     if symbol is None and node.name in ("pi", "inf"):
                         continue
@@ -119,22 +127,24 @@ class Inputs(Elements):
                         return False
         return True
 
-    def bind_inputs(self, s: syntax.Instance, space: Space, head: Interface, inputs: dict[str, syntax.Expr]) -> None:
+    def bind_inputs(
+        self, s: syntax.InstanceStatement, space: Space, head: Interface, inputs: dict[str, syntax.Expr]
+    ) -> None:
         """The inputs of a component: what its user gives them, a scene or the command line in its place, a default."""
         sight, around = self.resolver.sight(), self.resolver.loops
         for name, statement in head.inputs.items():
-            with self.entering(space):
-                unit = self.unit(statement.unit)
+            with self.context.entering(space):
+                unit = self.context.unit(statement.unit)
                 shape = tuple(
-                    (self.with_instance_parameters(a), self.with_instance_parameters(b))
-                    for a, b in self.shape(statement.decl)
+                    (self.context.with_instance_parameters(a), self.context.with_instance_parameters(b))
+                    for a, b in self.context.shape(statement.decl)
                 )
-            place, path = self.place(s.span), space.family(name).name
+            place, path = self.context.place(s.span), space.family(name).name
             if not space.prefix and path in self.given_inputs:
                 self._give(name, unit, shape, space, self.given_inputs[path])
                 continue
             if name in inputs:
-                value, here, bound, loops = inputs[name], self.current, tuple(sight.items()), around
+                value, here, bound, loops = inputs[name], self.context.current, tuple(sight.items()), around
             else:
                 assert statement.value is not None
                 value, here, bound, loops = statement.value, space, (), ()
@@ -143,14 +153,14 @@ class Inputs(Elements):
             )
             space.scope.symbols[name] = definition if space.prefix else self._with_move(definition, path, unit)
 
-    def _give(self, name: str, unit: Unit, shape: Shape, inside: Space, given: Given) -> None:
+    def _give(self, name: str, unit: Unit, shape: Shape, inside: Space, given: GivenInput) -> None:
         """What a scene or the command line gives, read in the scope of the model."""
         self.taken_inputs.add(inside.family(name).name)
         model = self.space
         here = Space("", model.scope, model.file_scope, given.source) if given.source is not model.source else model
-        with self.entering(here):
+        with self.context.entering(here):
             value = bare(self, given.statement.value, unit.dimension)
-            place = self.place(given.statement.span)
+            place = self.context.place(given.statement.span)
             definition = Definition(
                 name, "input", value, (), unit.dimension, here, place, given.statement.span, shape=shape
             )
@@ -173,11 +183,11 @@ def bare(it: Inputs, value: syntax.Expr, dimension: Dimension) -> syntax.Expr:
     inner = value.operand if isinstance(value, syntax.Negative) else value
     if it.resolver.source is it.space.source or not isinstance(inner, syntax.Number) or not dimension:
         return value
-    number = syntax.Quantity(inner.value, inner.text, _si_unit(dimension, inner.span), inner.span)
+    number = syntax.QuantityLiteral(inner.value, inner.text, _si_unit(dimension, inner.span), inner.span)
     it.files.scope.units.update({f"SI {dim.show(dimension)}": si(dimension)})
     return syntax.Negative(number, value.span) if isinstance(value, syntax.Negative) else number
 
 
-def _si_unit(dimension: Dimension, span: syntax.Span) -> syntax.Unit:
+def _si_unit(dimension: Dimension, span: syntax.Span) -> syntax.UnitExpression:
     name = f"SI {dim.show(dimension)}"
-    return syntax.Unit((syntax.UnitFactor(name, 1, ".", span),), name, span)
+    return syntax.UnitExpression((syntax.UnitFactor(name, 1, ".", span),), name, span)

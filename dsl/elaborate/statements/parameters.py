@@ -22,9 +22,9 @@ from sysdyn.dsl.text.diagnostics import Place, Related
 from sysdyn.dsl.tree import syntax
 from sysdyn.values import dataclass
 
-Valued = TypeVar("Valued", syntax.Param, syntax.State | syntax.Discrete)
+Valued = TypeVar("Valued", syntax.ParamStatement, syntax.StateStatement | syntax.DiscreteStatement)
 """A declaration with a value."""
-Stated = tuple[syntax.Param, tuple[syntax.For, ...]]
+Stated = tuple[syntax.ParamStatement, tuple[syntax.ForStatement, ...]]
 
 
 @dataclass(frozen=True, slots=True)
@@ -37,61 +37,64 @@ class Argument:
     place: Place
 
 
-class Parameters(ElaborationContext):
+class ParameterDeclarations:
     """Declares parameters."""
+
+    def __init__(self, context: ElaborationContext) -> None:
+        self.context, self.resolver, self.parts = context, context.resolver, context.parts
 
     def declare_parameters(self, body: Body, given: dict[str, Argument]) -> None:
         """Parameters in the order of their dependence (the default of one may name another); given: arguments."""
-        said = len(self.report)
+        said = len(self.context.report)
         order = body.order if body.order is not None else self.by_dependence(self._first(body))
-        if len(self.report) == said:  # what is wrong is told of each instance
+        if len(self.context.report) == said:  # what is wrong is told of each instance
             body.order = order
         for statement, loops in order:
             try:
-                with self.inside(loops) if loops else nullcontext():
+                with self.context.inside(loops) if loops else nullcontext():
                     self._is_of_constants(body, statement, statement.decl.name in given)
                     self._parameter(statement, given.get(statement.decl.name))
             except Failed:
-                self.scope.broken.add(statement.decl.name)
+                self.context.scope.broken.add(statement.decl.name)
 
     def _first(self, body: Body) -> dict[str, Stated]:
         """The parameters of a body by their names; E106 where there are two of one."""
         found: dict[str, Stated] = {}
-        for statement, loops in body.statements_of(syntax.Param):
-            assert isinstance(statement, syntax.Param)
+        for statement, loops in body.statements_of(syntax.ParamStatement):
+            assert isinstance(statement, syntax.ParamStatement)
             name = statement.decl.name
             if name in found:
-                related = (Related("first declared here", self.place(found[name][0].decl.span)),)
-                self.report.error(
-                    "E106", f"'{name}' is declared twice", self.place(statement.decl.span), related=related
+                related = (Related("first declared here", self.context.place(found[name][0].decl.span)),)
+                self.context.report.error(
+                    "E106", f"'{name}' is declared twice", self.context.place(statement.decl.span), related=related
                 )
                 continue
             found[name] = (statement, loops)
         return found
 
     def by_dependence(
-        self, found: dict[str, tuple[Valued, tuple[syntax.For, ...]]]
-    ) -> tuple[tuple[Valued, tuple[syntax.For, ...]], ...]:
+        self, found: dict[str, tuple[Valued, tuple[syntax.ForStatement, ...]]]
+    ) -> tuple[tuple[Valued, tuple[syntax.ForStatement, ...]], ...]:
         """Declarations by name, those that others name before these; E105."""
         needs = {name: _names_in(*stated) & found.keys() for name, stated in found.items()}
         order, circles = in_order(found, lambda name: sorted(needs[name]))
         for circle in circles:
             names = " or ".join(f"'{name}'" for name in circle[:-1])
             text, span = f"circular definition: {' -> '.join(circle)}", found[circle[-2]][0].span
-            self.report.error("E105", text, self.place(span), help=f"a value of its own for {names}")
-            self.scope.broken |= set(circle)
+            self.context.report.error("E105", text, self.context.place(span), help=f"a value of its own for {names}")
+            self.context.scope.broken |= set(circle)
         return tuple(found[name] for name in order)
 
-    def _parameter(self, statement: syntax.Param, given: Argument | None) -> None:
+    def _parameter(self, statement: syntax.ParamStatement, given: Argument | None) -> None:
         """Declare a parameter: its unit, shape and values, by the argument of the instance or else its default; E207 of
         neither.
         """
         decl = statement.decl
-        place = self.place(decl.span)
-        unit = self.unit(statement.unit) if statement.unit else None
-        shape = self.shape(decl)
-        family = self.current.family(decl.name, shape)
-        own = self.resolver.loops[len(self.current.loops) :]
+        place = self.context.place(decl.span)
+        unit = self.context.unit(statement.unit) if statement.unit else None
+        shape = self.context.shape(decl)
+        family = self.context.current.family(decl.name, shape)
+        own = self.resolver.loops[len(self.context.current.loops) :]
         # `for i in 1..n { param R = ... }`
         if own and not decl.indices:
             raise self.resolver.fail("E806", f"'{decl.name}' needs its loop variable: {decl.name}[i]", decl.span)
@@ -112,12 +115,12 @@ class Parameters(ElaborationContext):
             raise self.resolver.fail("E207", f"'{decl.name}' has neither a unit nor a default", decl.span, help=help_)
         around = tuple(n.data if n.op == "index" else f"_{k}" for k, n in enumerate(family.prefix))
         indices = (*around, *(loop.index for loop in own))
-        self.enter(ParameterSymbol(decl.name, family, unit.dimension, truth, place))
+        self.context.enter(ParameterSymbol(decl.name, family, unit.dimension, truth, place))
         self.parts.parameters[family.name] = Parameter(family.name, family.whole, unit, values, indices, place)
 
     def _values(
         self,
-        statement: syntax.Param,
+        statement: syntax.ParamStatement,
         written: syntax.Expr,
         value: Typed | Vector,
         unit: Unit | None,
@@ -130,7 +133,7 @@ class Parameters(ElaborationContext):
         for item in items:
             self._is_run_constant(item.node, statement, given)
         # `param k[1..3] = [1, 2]`
-        if not self.fills(value, shape):
+        if not self.context.fills(value, shape):
             message = f"'{statement.decl.name}' has {len(items)} values, which do not fit its shape"
             help_ = None if shape or not isinstance(value, Vector) else f"param {statement.decl.name}[1..{len(items)}]"
             if given is not None:
@@ -145,7 +148,7 @@ class Parameters(ElaborationContext):
             if item.dimension is not None and item.dimension != dimension:
                 literal = written.operand if isinstance(written, syntax.Negative) else written
                 have, want = dim.show(item.dimension), dim.show(dimension)
-                have = literal.unit.text if isinstance(literal, syntax.Quantity) else have
+                have = literal.unit.text if isinstance(literal, syntax.QuantityLiteral) else have
                 is_ = "dimensionless" if have == "dimensionless" else f"in {have}"
                 message = f"'{statement.decl.name}' is declared {want} but its {what} is {is_}"
                 if unit is None:
@@ -155,7 +158,7 @@ class Parameters(ElaborationContext):
                 code = "E207" if what == "default" else "E214"
                 # an argument: the finding stands at the instance, and names both
                 if code == "E214":
-                    name = self.current.path or self.current.component
+                    name = self.context.current.path or self.context.current.component
                     want = unit.text if unit is not None else want
                     message = f"argument {statement.decl.name} of '{name}' is {is_}, wants {want}"
                     if help_ is None and isinstance(written, syntax.Name) and have != "dimensionless":
@@ -177,13 +180,13 @@ class Parameters(ElaborationContext):
     def _default_unit(self, value: syntax.Expr, dimension: Dimension) -> Unit:
         if isinstance(value, syntax.Negative):
             value = value.operand
-        if isinstance(value, syntax.Quantity):
-            found = read_unit(value.unit, self.scope, self.resolver.source, self.report)
+        if isinstance(value, syntax.QuantityLiteral):
+            found = read_unit(value.unit, self.context.scope, self.resolver.source, self.context.report)
             if found is not None:
                 return found
         return si(dimension)
 
-    def _is_run_constant(self, node: Node, statement: syntax.Param, given: Argument | None) -> None:
+    def _is_run_constant(self, node: Node, statement: syntax.ParamStatement, given: Argument | None) -> None:
         discretes = self.parts.discretes
         for inner in ex.topological([node]):
             assigned = inner.op == "param" and inner.data in discretes
@@ -193,16 +196,18 @@ class Parameters(ElaborationContext):
                 vary = f"numbers and parameters alone; {varies}"
                 raise self._wrong("E807", message, statement, given, help=None if given is None else vary)
 
-    def _is_of_constants(self, body: Body, statement: syntax.Param, given: bool) -> None:
+    def _is_of_constants(self, body: Body, statement: syntax.ParamStatement, given: bool) -> None:
         """E807: a default that names what the body declares beside parameters, all of which are known before it."""
         if given or statement.value is None:
             return
         names = [n for n in walk(statement.value) if isinstance(n, syntax.Name) and n.name not in PREDEFINED]
-        names = [n for n in names if self.scope.find(n.name) is None]
+        names = [n for n in names if self.context.scope.find(n.name) is None]
         if not names:
             return
         own = {n.index.name for n in walk(statement.value) if isinstance(n, syntax.Reduction)}
-        others = {d.name for other, _ in body if not isinstance(other, syntax.Param) for d in declarations_of(other)}
+        others = {
+            d.name for other, _ in body if not isinstance(other, syntax.ParamStatement) for d in declarations_of(other)
+        }
         for name in names:
             if name.name in others - own - self.resolver.sight().keys():
                 what = statement.decl.name
@@ -211,16 +216,19 @@ class Parameters(ElaborationContext):
                 raise self.resolver.fail("E807", message, name.span, help=help_)
 
     def _wrong(
-        self, code: str, message: str, statement: syntax.Param, given: Argument | None, help: str | None
+        self, code: str, message: str, statement: syntax.ParamStatement, given: Argument | None, help: str | None
     ) -> Failed:
         """Report an error in a default, or in what an instance gives instead; raise what is returned."""
         if given is None:
             return self.resolver.fail(code, message, (statement.value or statement.decl).span, help=help)
-        where = Related(f"in component '{self.current.component}'", self.place(statement.decl.span))
+        where = Related(f"in component '{self.context.current.component}'", self.context.place(statement.decl.span))
         return self.resolver.fail(code, message, given.place, help=help, related=(where,))
 
 
-def _names_in(statement: syntax.Param | syntax.State | syntax.Discrete, loops: tuple[syntax.For, ...]) -> set[str]:
+def _names_in(
+    statement: syntax.ParamStatement | syntax.StateStatement | syntax.DiscreteStatement,
+    loops: tuple[syntax.ForStatement, ...],
+) -> set[str]:
     """What a declaration reads, with the loops around it."""
     bounds = [bound for loop in loops for bound in (loop.lower, loop.upper)]
     roots: list[object] = [statement.value, *statement.decl.indices, *bounds]
