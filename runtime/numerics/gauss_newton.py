@@ -288,7 +288,7 @@ def _solve(problem: Problem, x: Floats, most: int) -> Solution:
             break
         taken += 1
         linear = _Linear(problem, x)
-        problem.work.iteration(linear.shape, problem.rows.size)
+        problem.work.iteration(linear.shape, problem.rows.size, full=bool(problem.levels))
 
         def measure(z: Floats, linear: _Linear = linear) -> tuple[float, Floats]:
             problem.work.evaluation(problem.rows.size)

@@ -56,9 +56,7 @@ class Rows:
         here, free = self.slopes(x), self.free[self.columns]
         aside = self.size * np.random.default_rng(1).uniform(0.5, 1.5, x.size)
         a, b = here[free], self.slopes(np.where(self.free, x + aside, x))[free]
-        with np.errstate(invalid="ignore"):  # a slope beyond the largest number is like none
-            alike = np.abs(a - b) <= ALIKE * np.maximum(np.abs(a), np.abs(b))
-        if not alike.all():
+        if not _alike(a, b).all():
             return False
         return self._unmet(x, here, self.asked)
 
@@ -71,8 +69,7 @@ class Rows:
         linear = self.asked.copy()
         for part in AROUND:
             there = self.slopes(np.where(self.free, x + part * step, x))
-            alike = np.abs(there - here) <= ALIKE * np.maximum(np.abs(there), np.abs(here))
-            linear[self.rows[free & ~alike]] = False
+            linear[self.rows[free & ~_alike(here, there)]] = False
         return linear if self._unmet(x, np.where(linear[self.rows], here, 0.0), linear) else None
 
     def _unmet(self, x: Floats, here: Floats, asked: Mask) -> bool:
@@ -87,6 +84,11 @@ class Rows:
         if not (np.isfinite(matrix).all() and np.isfinite(aim).all()):
             raise NotFiniteError
         return graded(matrix, aim, step, MISSES * terms[asked], doubt) == MISSED
+
+
+def _alike(a: Floats, b: Floats) -> Mask:
+    """Where slopes are the same; one beyond the largest number is like none."""
+    return np.asarray(np.isfinite(a) & (np.abs(np.where(np.isfinite(b), b, np.inf) - a) <= ALIKE * np.abs(a)))
 
 
 def unmet(settler: Settler, t: float, y: Floats, yd: Floats, state: Mask) -> bool:

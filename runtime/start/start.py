@@ -38,7 +38,6 @@ from sysdyn.runtime.start.strategies import (
     applicable,
     around,
     first,
-    hopeful,
 )
 from sysdyn.values import dataclass
 
@@ -217,13 +216,11 @@ def _number(starter: Starter, rows: Mask, unknowns: Mask) -> Places:
     return np.bincount(starter.rows[take], minlength=starter.settled.rows)
 
 
-def _attempt(starter: Starter, t: float, guess: Floats, free: Mask, most: int | None = None) -> tuple[Solution, str]:
-    """The first strategy that holds, of all or as many, from the guess, and its name; the least residual and "" where
-    none does.
-    """
+def _attempt(starter: Starter, t: float, guess: Floats, free: Mask, *, quickly: bool = False) -> tuple[Solution, str]:
+    """The first strategy that holds, from the guess, and its name; the least residual and "" where none does."""
     x = _finite(starter, t, _begun(starter, t, guess, free), free)
     best = Solution(x, np.inf)
-    for name, strategy in hopeful(starter, t, x, free, itertools.islice(applicable(starter, t, x), most)):
+    for name, strategy in applicable(starter, t, x, free, quickly=quickly):
         found, holds = first(strategy(starter, t, x, guess, free), x)
         again, sure = anew(starter, t, found, x, guess, free)
         with starter.granted():  # what led there has taken its own
@@ -375,7 +372,7 @@ def _sought(starter: Starter, t: float, guess: Floats, *, quickly: bool, silent:
     if silent and not starter.jumping and no_start(starter, t, guess, starter.free):
         raise InconsistentStart("stuck", float("inf"))
     budget = starter.work.budget
-    best, strategy = _attempt(starter, t, guess, starter.free, 1 if quickly else None)
+    best, strategy = _attempt(starter, t, guess, starter.free, quickly=quickly)
     if strategy:
         return best, strategy
     if quickly or starter.jumping:

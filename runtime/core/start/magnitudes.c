@@ -186,7 +186,7 @@ int sd_propagate_beside(const sd_balance *m, const double *size, const char *sma
 }
 
 int sd_scale(const sd_balance *m, const double *nominal, int32_t first, const char *rated, const int32_t *member,
-             int32_t members, const double *x, double *jacobian, double *residual, int32_t flags, double *scale)
+             int32_t members, const double *x, double *jacobian, double *residual, double *scale)
 {
     double *most = calloc((size_t)members + 1, sizeof *most);
     if (!most)
@@ -198,7 +198,7 @@ int sd_scale(const sd_balance *m, const double *nominal, int32_t first, const ch
     for (int32_t e = 0; e < m->entries; e++)
         jacobian[e] = isfinite(jacobian[e]) ? fabs(jacobian[e]) : 0.0;
     char *small = sd_small(m, jacobian);
-    int failed = small ? sd_propagate_beside(m, jacobian, small, residual, rated, NULL, flags, scale) : -1;
+    int failed = small ? sd_propagate_beside(m, jacobian, small, residual, rated, NULL, 0, scale) : -1;
     /* unknowns of y are no less than a thousandth of their like */
     for (int32_t k = 0; k < first; k++)
         most[member[k]] = sd_larger(most[member[k]], scale[k]);
@@ -206,7 +206,7 @@ int sd_scale(const sd_balance *m, const double *nominal, int32_t first, const ch
         scale[k] = sd_larger(scale[k], SMALL * most[member[k]]);
         scale[k] = scale[k] > NOTHING ? scale[k] : 1.0;
     }
-    failed |= small ? sd_propagate_beside(m, jacobian, small, residual, NULL, NULL, flags, scale) : -1;
+    failed |= small ? sd_propagate_beside(m, jacobian, small, residual, NULL, NULL, 0, scale) : -1;
     free(small);
     for (int32_t k = 0; k < m->unknowns; k++)
         scale[k] = scale[k] > NOTHING ? scale[k] : 1.0;
