@@ -5,18 +5,19 @@ from __future__ import annotations
 import time
 from dataclasses import field
 
+from sysdyn.runtime import _core
 from sysdyn.runtime.numerics.least_change import DENSE, SINGULAR_VALUES
 from sysdyn.values import dataclass
 
-GRANTED = 3.6e9
+GRANTED: float = _core.SD_GRANTED
 """Operations that a search may take: two or three seconds; the hardest start of our models takes half of it."""
-ITERATIONS = 40
+ITERATIONS: int = _core.SD_ITERATIONS
 """Iterations that a search may take however large they are."""
-EVALUATION = 1e6
+EVALUATION: float = _core.SD_EVALUATION
 """Operations that evaluating the rows takes whatever their number: calls, not arithmetic."""
 FACTORS = 4e6
 """Operations that factors of sparse rows take whatever their number: calls (2 ms of 5 for 240 rows)."""
-EACH = 40.0
+EACH: float = _core.SD_EACH
 """Operations that an entry of the matrix takes in an evaluation."""
 
 

@@ -11,6 +11,7 @@ from collections.abc import Callable
 
 import numpy as np
 from numpy.typing import NDArray
+from sysdyn.runtime import tuning
 from sysdyn.runtime.model import core_library as lib
 from sysdyn.runtime.model.description import Floats, Ints
 from sysdyn.runtime.numerics.gauss_newton import MISSED, graded
@@ -19,17 +20,17 @@ from sysdyn.runtime.start.settled import Settler, columns_of_rates
 from sysdyn.runtime.start.starter import Starter
 from sysdyn.values import dataclass
 
-DENSE = 300
+DENSE = tuning.DENSE
 """Unknowns up to which matrices are full; of more nothing is said."""
-ALIKE = 1e-9
+ALIKE = tuning.SAME
 """Of a slope: what it differs by elsewhere and is constant."""
-AROUND = (1.0, -1.0, 1e3, -1e3)
+AROUND = tuple(sign * far for far in (1.0, 1.0 / tuning.SMALL) for sign in (1.0, -1.0))
 """Magnitudes from a point where the slopes of a linear row are the same."""
-MISSES = 1e-4
+MISSES = tuning.SLIGHT
 """Of the terms of a row: what it may miss by as a step of the run leaves it; more, in a sum of rows that eliminates all
 that may move, is no such miss.
 """
-NOTHING = 1e-6
+NOTHING = tuning.UNSEEN
 """Of its magnitude: what an unknown is of which nothing but round-off may be there."""
 
 Mask = NDArray[np.bool_]

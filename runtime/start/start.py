@@ -13,6 +13,7 @@ import itertools
 from collections.abc import Sequence
 
 import numpy as np
+from sysdyn.runtime import tuning
 from sysdyn.runtime.model.description import Floats, Ints, Places
 from sysdyn.runtime.model.failures import InconsistentStart, RowLabel, SolverFailure
 from sysdyn.runtime.model.held_rows import switch_rows
@@ -45,9 +46,9 @@ NOTHING = 1e-100
 """Of any unit: what an iteration down a steep law leaves of zero."""
 HELD = "#held "
 """Before the name of a coordinate: what its flow and others hold together (compiler/forms/lowering.py)."""
-MOVED = 1e-6
+MOVED = tuning.UNSEEN
 """Of its magnitude: what a fixed value that is in the way has to move by, at least."""
-BESIDE = 1e-3
+BESIDE = tuning.SMALL
 """Of the move of the fixed value most in the way: what moves by less is not."""
 QUICK = 0.3
 """Times what a search may take: what one may that is asked for quickly; those that succeed take at most 0.1."""

@@ -18,6 +18,7 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+from sysdyn.runtime import tuning
 from sysdyn.runtime.model import core_library as lib
 from sysdyn.runtime.model.balance import Balance
 from sysdyn.runtime.model.description import START, Floats, Initial, Ints, Places, stated
@@ -35,7 +36,7 @@ from sysdyn.runtime.start.sums import Sums, Weights, of_few, of_many, weights
 
 Mask = NDArray[np.bool_]
 STATE = ("q", "f", "p", "s", *START)
-NOISE = 1e-13
+NOISE = tuning.BY_FACTORS
 DRIFT = 0.55
 """Of what a state moves by in a step, behind one of half its length: with no more it drifts, and has not jumped."""
 WRITTEN = 4.0 * float(np.finfo(float).eps)

@@ -10,6 +10,7 @@ from collections.abc import Callable, Iterator
 from dataclasses import replace
 
 import numpy as np
+from sysdyn.runtime import tuning
 from sysdyn.runtime.model.description import Floats, Ints
 from sysdyn.runtime.model.inertia import own_unknown
 from sysdyn.runtime.numerics.gauss_newton import CORRECTED, Solution, solve, stepped
@@ -21,14 +22,15 @@ from sysdyn.runtime.start.least import problem_of
 from sysdyn.runtime.start.linearly import contradicting
 from sysdyn.runtime.start.starter import Mask, Starter
 
-_AMPLITUDES = (1e-2, 1e-1, 1.0, 1e-4, 10.0, 1e-6, 1e2, 1e-1, 1.0, 10.0)
+_AMPLITUDES = tuple(10.0**power for power in (-2, -1, 0, -4, 1, -6, 2))
+"""Of magnitudes: how far points around lie, the likelier first."""
 STRAIGHT_ON, ALONG = 0.5, 2.0
 """Of the work of a search: what Newton's method may take before a homotopy is asked (twice what the hardest start of
 the models does), and a homotopy (eight TTL gates between potentials: 1.8).
 """
 FIRST_PART, LEAST_PART = 0.1, 1e-5
 """Of misses: what is faded out first; less is not faded out at once (chains of 2 to 8 TTL gates ask for 0.006)."""
-FOLLOWED, NEARLY = 20, 1e-4
+FOLLOWED, NEARLY = 20, tuning.SLIGHT
 """Iterations in which Newton's method follows what fades, and the scaled residual at which it has."""
 
 
