@@ -21,6 +21,9 @@ SD_SLIGHT: float
 SD_SMALL: float
 SD_PIVOT: float
 SD_GENERIC: float
+SD_GRANTED: float
+SD_EVALUATION: float
+SD_EACH: float
 FALLEN: float
 ROUNDING: float
 SD_CONTRACT: int
@@ -41,6 +44,13 @@ SD_AUDIT_HEAD: int
 SD_LEDGER_ROWS: int
 SD_LARGEST: int
 SD_CAPPED: int
+SD_DIFFERS: int
+SD_MISSED: int
+SD_LEFT_OUT: int
+SD_ITERATIONS: int
+SD_HALVINGS: int
+SD_LOST: int
+SD_FOLDS: int
 SD_MAX_ORDER: int
 SD_ENERGY_STAGES: int
 SD_DOPRI_ALL: int

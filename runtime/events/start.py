@@ -8,6 +8,7 @@ from contextlib import suppress
 from dataclasses import replace
 
 import numpy as np
+from sysdyn.runtime import tuning
 from sysdyn.runtime.events.contacts import FAINT, Contacts
 from sysdyn.runtime.events.determined import Determined
 from sysdyn.runtime.events.handler import Handler, Standing
@@ -25,7 +26,7 @@ from sysdyn.runtime.start.start import ConsistentState, consistent_start
 SAMPLES = 4
 """Points whose samples at the start are asked for: what a converter samples of its own output is what it starts with.
 """
-AHEAD = (1e-8, 1e-5)
+AHEAD = (tuning.HALF_OF_ITS_DIGITS, 1e-5)
 """Of the time in which the unknowns change: how far ahead a tie between active sets is looked at, where sources alone
 have moved.
 """
@@ -45,8 +46,6 @@ SETS, SWIFTLY = 3.0, 1.2
 """Times what a search may take: what is spent on all sets, on those that may have a start at once."""
 TURNS = 4
 """Sets that are tried behind such a step."""
-SPAN = 1.0
-"""s: in which what starts at rest may come to its magnitude."""
 
 
 def eventful_start(system: System, t0: float, plan: Plan, budget: Budget | None = None) -> ConsistentState:
@@ -226,8 +225,8 @@ class _Starts:
 
     def _size(self, t: float, y: Floats, yd: Floats) -> None:
         """What is as large as the largest of its like is no noise, however fast steep laws have it move."""
-        system = self.contacts.system
-        magnitude, time = magnitudes(system, t, t + SPAN, y, yd)
+        system = self.contacts.system  # within 1 s what starts at rest may come to its magnitude
+        magnitude, time = magnitudes(system, t, t + 1.0, y, yd)
         here = np.zeros(magnitude.size)
         here[: y.size] = np.abs(y)
         here = largest_of_group(alike(system), here)

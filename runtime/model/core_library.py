@@ -247,7 +247,7 @@ def _load() -> Any:
         "sd_ceiling": (None, [_P, c.c_int, _P, _P]),
         "sd_unresolved": (c.c_int, [*[_P] * 5]),
         "sd_noise": (c.c_int, [*[_P] * 7, _D, _I, _D, _P]),
-        "sd_scale": (c.c_int, [_P, _P, _I, _P, _P, _I, _P, _P, _P, _I, _P]),
+        "sd_scale": (c.c_int, [_P, _P, _I, _P, _P, _I, _P, _P, _P, _P]),
         "sd_sparse_factors": (None, [_I, _I, _I, *[_P] * 5]),
         "sd_factors": (None, [_I, _I, _P, _P, _P, _P]),
         "sd_rank": (c.c_int, [_I, _I, _P, _D]),

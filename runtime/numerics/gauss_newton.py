@@ -14,7 +14,7 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from sysdyn.runtime import tuning
+from sysdyn.runtime import _core, tuning
 from sysdyn.runtime.model import core_library as lib
 from sysdyn.runtime.model.description import Floats
 from sysdyn.runtime.numerics.least_change import DENSE, SINGULAR_VALUES, Mask, in_order, least_norm
@@ -27,18 +27,19 @@ SMALL = 64
 """Rows and unknowns up to which a problem that the core knows is solved there."""
 CORRECTED = 240
 """The same up to which rows are corrected: a few eliminations in which each entry has its round-off."""
-_ITERATIONS = 60
-_FOLDS = 709
+ITERATIONS = 60
+_FOLDS: int = _core.SD_FOLDS
 """Iterations that an exponential, falling by e in each, takes from the largest number: as long as rows shrink as fast
 as their terms do none is counted."""
-_HALVINGS, _FLATTEST = 12, 1023
-STRAIGHT = 1e-4
+_HALVINGS: int = _core.SD_HALVINGS
+_FLATTEST = int(np.finfo(float).maxexp) - 1
+STRAIGHT = tuning.SLIGHT
 """Of rows at the middle of a way: what they may be off the mean of those at its ends and count as linear along it."""
-_LOST = 3
+_LOST: int = _core.SD_LOST
 """Directions one after the other along which no step makes the rows smaller: the next ones do not either."""
-MISSED = 2
+MISSED: int = _core.SD_MISSED
 """What `graded` answers where rows that are left miss by more than their round-off."""
-_ROUND_OFF = 2e-15
+_ROUND_OFF = 8.0 * float(np.finfo(float).eps)
 _ROUNDINGS = 8.0
 """Times the unit round-off of its terms by their slopes: what evaluating a row of several operations may be off by."""
 _BESIDE = tuning.HALF_OF_ITS_DIGITS
@@ -250,7 +251,7 @@ class _Linear:
         return stays + least_norm(self.shape, held.pop(), aim, spent=True, idle=idle)
 
 
-def solve(problem: Problem, x: Floats, most: int = _ITERATIONS) -> Solution:
+def solve(problem: Problem, x: Floats, most: int = ITERATIONS) -> Solution:
     """From x towards the solution nearest to problem.guess; the best point met in so many iterations."""
     if problem.core is not None and not problem.levels:
         small = max(int(problem.use.sum()), int(problem.free.sum())) <= SMALL
@@ -288,7 +289,7 @@ def _solve(problem: Problem, x: Floats, most: int) -> Solution:
             break
         taken += 1
         linear = _Linear(problem, x)
-        problem.work.iteration(linear.shape, problem.rows.size)
+        problem.work.iteration(linear.shape, problem.rows.size, full=bool(problem.levels))
 
         def measure(z: Floats, linear: _Linear = linear) -> tuple[float, Floats]:
             problem.work.evaluation(problem.rows.size)
@@ -399,7 +400,7 @@ def least_residual(problem: Problem, x: Floats) -> Floats:
             return (problem.residual(z) * scale)[problem.use]
 
         r = measure(x)
-        for _ in range(_ITERATIONS):
+        for _ in range(ITERATIONS):
             linear = _Linear(problem, x)
             i, j, v = linear.entries()
             a = np.zeros(linear.shape)

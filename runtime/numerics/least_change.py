@@ -176,7 +176,7 @@ def _to_the_rank(shape: tuple[int, int], entries: tuple[Any, Any, Floats], aim: 
 
 
 def _saddle_point(shape: tuple[int, int], entries: tuple[Any, Any, Floats], aim: Floats, weight: float = 1.0) -> Floats:
-    """The u of least norm with A u = aim from [weight I, A^T; A, -eps], dense up to DENSE unknowns."""
+    """The u of least norm with A u = aim from [weight I, A^T; A, -eps]."""
     rows, unknowns = shape
     i, j, v = entries
     here = np.arange(unknowns), unknowns + np.arange(rows)
@@ -185,21 +185,12 @@ def _saddle_point(shape: tuple[int, int], entries: tuple[Any, Any, Floats], aim:
         np.concatenate([here[0], unknowns + i, j, here[1]]),
     )
     values = np.concatenate([np.full(unknowns, weight), v, v, np.full(rows, -EPS)])
-    apply: Callable[[Floats], Floats]
-    back: Callable[[Floats], Floats]
-    if max(shape) <= DENSE:
-        full = np.zeros((unknowns + rows, unknowns + rows))
-        np.add.at(full, places, values)
-        inverse = np.linalg.inv(full)
-        apply, back = full.dot, inverse.dot
-    else:
-        matrix = Symmetric(unknowns + rows, places, values, definite=True)
-        apply, back = matrix.times, matrix.solve
+    matrix = Symmetric(unknowns + rows, places, values, definite=True)
     found = np.zeros(unknowns + rows)
     for _ in range(_PROXIMAL):
         # eps acts on the change of the multipliers only, so that it leaves no trace in the solution
         right = np.concatenate([np.zeros(unknowns), aim - EPS * found[unknowns:]])
-        found = found + back(right - apply(found))
+        found = found + matrix.solve(right - matrix.times(found))
     return found[:unknowns]
 
 

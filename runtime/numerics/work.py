@@ -5,16 +5,19 @@ from __future__ import annotations
 import time
 from dataclasses import field
 
+from sysdyn.runtime import _core
 from sysdyn.runtime.numerics.least_change import DENSE, SINGULAR_VALUES
 from sysdyn.values import dataclass
 
-GRANTED = 3.6e9
+GRANTED: float = _core.SD_GRANTED
 """Operations that a search may take: two or three seconds; the hardest start of our models takes half of it."""
-ITERATIONS = 40
+ITERATIONS: int = _core.SD_ITERATIONS
 """Iterations that a search may take however large they are."""
-EVALUATION = 1e6
+EVALUATION: float = _core.SD_EVALUATION
 """Operations that evaluating the rows takes whatever their number: calls, not arithmetic."""
-EACH = 40.0
+FACTORS = 4e6
+"""Operations that factors of sparse rows take whatever their number: calls (2 ms of 5 for 240 rows)."""
+EACH: float = _core.SD_EACH
 """Operations that an entry of the matrix takes in an evaluation."""
 
 
@@ -71,13 +74,15 @@ class Work:
         self.spent += operations
         self.budget.count(operations)
 
-    def iteration(self, shape: tuple[int, int], entries: int) -> None:
-        """Count one linearisation with its solution, of so many rows and unknowns."""
+    def iteration(self, shape: tuple[int, int], entries: int, *, full: bool = True) -> None:
+        """Count one linearisation with its solution, of so many rows and unknowns; full: by full matrices up to DENSE,
+        else by factors beyond those that singular values solve.
+        """
         rows, unknowns = shape
-        solution = 2e3 * (rows + unknowns + entries)
+        solution = FACTORS + 2e3 * (rows + unknowns + entries)
         if max(shape) <= SINGULAR_VALUES:
             solution = 15.0 * rows * unknowns * min(shape)
-        elif max(shape) <= DENSE:
+        elif full and max(shape) <= DENSE:
             solution = 4.0 * (rows + unknowns) ** 3
         self.clocked()
         whole = solution + EVALUATION + EACH * entries

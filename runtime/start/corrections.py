@@ -6,15 +6,16 @@ Volts that a leak of megohms ties are lost in the steps of a search, whose rows 
 from __future__ import annotations
 
 import numpy as np
+from sysdyn.runtime import tuning
 from sysdyn.runtime.model.description import Floats
-from sysdyn.runtime.numerics.gauss_newton import Correction, corrected
+from sysdyn.runtime.numerics.gauss_newton import ITERATIONS, Correction, corrected
 from sysdyn.runtime.start.least import problem_of
 from sysdyn.runtime.start.starter import STATE, Mask, Starter
 from sysdyn.values import dataclass
 
-EXACT = 1e-9
+EXACT = tuning.SAME
 """Scaled residual of rows that hold, and a step that is none."""
-SHARPER = 60
+SHARPER = ITERATIONS
 """Corrections in which what follows from the state is found, or left as it was."""
 BACK = 0.5
 """Of the step before: what is longer, and the other way, is round-off where it may be."""

@@ -6,6 +6,7 @@ Neither depends on the way to it then.  Beside steep laws what does not come to 
 from __future__ import annotations
 
 import numpy as np
+from sysdyn.runtime import tuning
 from sysdyn.runtime.model.description import Floats
 from sysdyn.runtime.numerics.gauss_newton import Solution, solve
 from sysdyn.runtime.numerics.least_change import DENSE, SINGULAR_VALUES
@@ -26,7 +27,7 @@ from sysdyn.runtime.start.held import (
 from sysdyn.runtime.start.least import problem_of
 from sysdyn.runtime.start.starter import NOISE, Mask, Starter
 
-EPS, RESOLVED = 2.3e-16, 1e-3
+EPS, RESOLVED = float(np.finfo(float).eps), tuning.SMALL
 """Round-off; of contents: what it may be."""
 
 

@@ -9,6 +9,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 import numpy as np
+from sysdyn.runtime import tuning
 from sysdyn.runtime.model.description import Floats, Ints
 from sysdyn.runtime.model.slopes import FALLS, rows_without_slope
 from sysdyn.runtime.numerics.gauss_newton import solve
@@ -16,15 +17,15 @@ from sysdyn.runtime.start.equations import HIDDEN
 from sysdyn.runtime.start.least import problem_of
 from sysdyn.runtime.start.starter import Mask, Starter
 
-NEXT_TO_NOTHING, NEARLY, HOLDS, STEEPLY = 1e-7, 1e-4, 1e-15, 1e-13
+NEXT_TO_NOTHING, NEARLY, HOLDS, STEEPLY = tuning.OPEN, tuning.SLIGHT, tuning.BY_SUMS, tuning.BY_FACTORS
 """Of the largest alike: roots of round-off; what a search leaves, which comes nearer by halves alone.  Scaled residual
 of rows that hold to round-off; that roots of it make.
 """
-ROOT = 1e-3
+ROOT = tuning.SMALL
 """Of magnitudes: beside a root slopes are others even so near, those of an exponential are not."""
-NO_SLOPE = 1e-10
+NO_SLOPE = tuning.MET
 """Of the slope beside: what is less is none (slopes are those next to a root where others are no numbers at it)."""
-OWN = 1e-6
+OWN = tuning.UNSEEN
 """Scaled residual of rows that are missed."""
 
 

@@ -9,6 +9,7 @@ from collections.abc import Callable, Iterable, Iterator
 from dataclasses import replace
 
 import numpy as np
+from sysdyn.runtime import tuning
 from sysdyn.runtime.model.description import Floats
 from sysdyn.runtime.numerics.gauss_newton import Solution, solve, stepped
 from sysdyn.runtime.numerics.least_change import DENSE
@@ -31,13 +32,13 @@ RESCALINGS, _DOUBTED = 6, 3
 """Times that magnitudes are taken anew; after which of them a state that is held is asked whether it can be, of active
 sets, which may contradict it.
 """
-IDLE, SAME = 2, 1e-2
+IDLE, SAME = 2, tuning.PERCENT
 """Times that magnitudes taken anew change nothing, behind which they never will; of misses: what is no change."""
-BACK = 1e-10
+BACK = tuning.MET
 """Steps of this part of magnitudes are round-off of the linear algebra, and tried without."""
-CLOSED = 1e-12
+CLOSED = tuning.CANCELS
 """Scaled residual of rows that hold to round-off."""
-ASTRAY, SETTLED, FARTHER, _SETTLING = 1e-5, 1e-10, 1e-9, 20
+ASTRAY, SETTLED, FARTHER, _SETTLING = 1e-5, tuning.MET, tuning.SAME, 20
 """Of the largest alike: a state farther from the least change has moved for nothing; of its scale: what searches
 leave; in units of moves, where what nothing is said of weighs a thousandth: one is farther than another; steps along
 what bends.

@@ -16,13 +16,12 @@ from numpy.typing import NDArray
 from sysdyn.runtime.model.description import Floats
 from sysdyn.runtime.model.facts import Mask
 from sysdyn.runtime.numerics.equilibrate import factors
+from sysdyn.runtime.numerics.least_change import DENSE
 from sysdyn.runtime.numerics.rank import null_space
 from sysdyn.runtime.start.integrated import BROKEN
 from sysdyn.values import dataclass
 
 Places = NDArray[np.signedinteger[Any]]
-MOST = 400
-"""Rows or unknowns of which no full matrix is decomposed."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -51,7 +50,7 @@ def hidden(entries: tuple[Places, Places, Floats], rows: Mask, answers: Mask, as
     i, j, v = entries
     mine = rows[i] & answers[j] & (v != 0.0)
     (own, row), (other, column) = (np.unique(item[mine], return_inverse=True) for item in (i, j))
-    if not own.size or max(own.size, other.size) > MOST:
+    if not own.size or max(own.size, other.size) > DENSE:
         return None
     matrix = np.zeros((own.size, other.size))
     np.add.at(matrix, (row, column), v[mine])

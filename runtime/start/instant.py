@@ -25,6 +25,7 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+from sysdyn.runtime import tuning
 from sysdyn.runtime.model.description import Floats
 from sysdyn.runtime.model.facts import Mask
 from sysdyn.runtime.model.system import System
@@ -37,12 +38,12 @@ from sysdyn.runtime.start.settled import inertial_rows
 from sysdyn.values import dataclass
 
 FOLLOWS = ("f", "p", "e", "kappa", "mu")
-LOOSE = 1e3
+LOOSE = 1.0 / tuning.SMALL
 """Times its magnitude, what follows may jump more easily than what nothing else decides about."""
-ROUND_OFF = 1e-14
+ROUND_OFF = tuning.BY_SUMS
 """Of its magnitude: what an unknown is moved by that stays where it is."""
 ITERATIONS = 30
-CONVERGED = 1e-10
+CONVERGED = tuning.MET
 """Of their magnitudes: a step of Newton's method behind which the next is round-off."""
 POINTS = 24
 """Of Gauss's rule, by which powers up to the 47th have their mean."""

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import numpy as np
 from numpy.typing import NDArray
+from sysdyn.runtime import tuning
 from sysdyn.runtime.condense.elimination import affine
 from sysdyn.runtime.model.description import Floats, Ints
 from sysdyn.runtime.model.facts import Mask
@@ -14,7 +15,7 @@ from sysdyn.runtime.model.system import System
 from sysdyn.values import dataclass
 
 FORCES = ("e", "kappa", "mu")
-BROKEN = 1e-10
+BROKEN = tuning.MET
 """Of its terms: what a row is missed by, or an impulse, that is no round-off."""
 
 

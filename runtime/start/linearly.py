@@ -11,6 +11,7 @@ from collections.abc import Callable
 
 import numpy as np
 from numpy.typing import NDArray
+from sysdyn.runtime import tuning
 from sysdyn.runtime.model import core_library as lib
 from sysdyn.runtime.model.description import Floats, Ints
 from sysdyn.runtime.numerics.gauss_newton import MISSED, graded
@@ -19,17 +20,17 @@ from sysdyn.runtime.start.settled import Settler, columns_of_rates
 from sysdyn.runtime.start.starter import Starter
 from sysdyn.values import dataclass
 
-DENSE = 300
+DENSE = tuning.DENSE
 """Unknowns up to which matrices are full; of more nothing is said."""
-ALIKE = 1e-9
+ALIKE = tuning.SAME
 """Of a slope: what it differs by elsewhere and is constant."""
-AROUND = (1.0, -1.0, 1e3, -1e3)
+AROUND = tuple(sign * far for far in (1.0, 1.0 / tuning.SMALL) for sign in (1.0, -1.0))
 """Magnitudes from a point where the slopes of a linear row are the same."""
-MISSES = 1e-4
+MISSES = tuning.SLIGHT
 """Of the terms of a row: what it may miss by as a step of the run leaves it; more, in a sum of rows that eliminates all
 that may move, is no such miss.
 """
-NOTHING = 1e-6
+NOTHING = tuning.UNSEEN
 """Of its magnitude: what an unknown is of which nothing but round-off may be there."""
 
 Mask = NDArray[np.bool_]
@@ -56,9 +57,7 @@ class Rows:
         here, free = self.slopes(x), self.free[self.columns]
         aside = self.size * np.random.default_rng(1).uniform(0.5, 1.5, x.size)
         a, b = here[free], self.slopes(np.where(self.free, x + aside, x))[free]
-        with np.errstate(invalid="ignore"):  # a slope beyond the largest number is like none
-            alike = np.abs(a - b) <= ALIKE * np.maximum(np.abs(a), np.abs(b))
-        if not alike.all():
+        if not _alike(a, b).all():
             return False
         return self._unmet(x, here, self.asked)
 
@@ -71,8 +70,7 @@ class Rows:
         linear = self.asked.copy()
         for part in AROUND:
             there = self.slopes(np.where(self.free, x + part * step, x))
-            alike = np.abs(there - here) <= ALIKE * np.maximum(np.abs(there), np.abs(here))
-            linear[self.rows[free & ~alike]] = False
+            linear[self.rows[free & ~_alike(here, there)]] = False
         return linear if self._unmet(x, np.where(linear[self.rows], here, 0.0), linear) else None
 
     def _unmet(self, x: Floats, here: Floats, asked: Mask) -> bool:
@@ -87,6 +85,11 @@ class Rows:
         if not (np.isfinite(matrix).all() and np.isfinite(aim).all()):
             raise NotFiniteError
         return graded(matrix, aim, step, MISSES * terms[asked], doubt) == MISSED
+
+
+def _alike(a: Floats, b: Floats) -> Mask:
+    """Where slopes are the same; one beyond the largest number is like none."""
+    return np.asarray(np.isfinite(a) & (np.abs(np.where(np.isfinite(b), b, np.inf) - a) <= ALIKE * np.abs(a)))
 
 
 def unmet(settler: Settler, t: float, y: Floats, yd: Floats, state: Mask) -> bool:

@@ -8,10 +8,11 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 import numpy as np
+from sysdyn.runtime import tuning
 from sysdyn.runtime.model.description import Floats
 from sysdyn.runtime.start.starter import Starter
 
-NOTED = 1e-9
+NOTED = tuning.SAME
 """Of its size: a move of a guess that is told."""
 Moved = tuple[str, float, float, str]
 """Name, guess, value at the start, what asked for that."""

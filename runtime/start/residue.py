@@ -10,10 +10,11 @@ from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
+from sysdyn.runtime import tuning
 from sysdyn.runtime.model.description import Floats
 from sysdyn.runtime.start.equations import HIDDEN
 
-RESIDUE = 1e-9
+RESIDUE = tuning.SAME
 """Of what a row's free term is at other times: round-off of a zero."""
 LATER = (0.6180339887, 6.180339887e6)
 """s: such times, in no simple ratio to a period; for what turns in years too."""

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import numpy as np
 from numpy.typing import NDArray
+from sysdyn.runtime import tuning
 from sysdyn.runtime.model import core_library as lib
 from sysdyn.runtime.model.description import Floats
 from sysdyn.runtime.model.failures import SolverFailure
@@ -17,15 +18,15 @@ from sysdyn.runtime.start.settled import HELD, Settler
 from sysdyn.runtime.start.starter import Starter
 from sysdyn.runtime.start.strategies import behind
 
-CLOSE = 1e-9
+CLOSE = tuning.SAME
 """Scaled residual with which a point lives (settle.c)."""
-STILL = 1e-10
+STILL = tuning.MET
 """Of its magnitude: what a state may move by and has not jumped."""
 GUESSES = (0.0, *(sign * size for size in (1.0, 0.1, 1e-2, 1e-3, 10.0) for sign in (1.0, -1.0)))
 """Of their magnitudes: what flows without inertia and implicit efforts are moved by before a state is."""
-SLACK = 1e-6
+SLACK = tuning.UNSEEN
 """Of its magnitude: what a state may move by where rows hold only nearly."""
-NEXT_TO_ZERO = 1e-6
+NEXT_TO_ZERO = tuning.UNSEEN
 """Of its magnitude: what follows and is less says nothing of its size."""
 
 

@@ -13,6 +13,7 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+from sysdyn.runtime import _core, tuning
 from sysdyn.runtime.condense.condensed import Condensed
 from sysdyn.runtime.condense.elimination import affine
 from sysdyn.runtime.condense.sums import numbers_of
@@ -22,7 +23,7 @@ from sysdyn.runtime.model.inertia import stored_between
 from sysdyn.runtime.model.layout import entries_of
 from sysdyn.runtime.model.own_rows import own_rows, own_rows_of_rates
 from sysdyn.runtime.model.patterns import Pattern, Places, compress
-from sysdyn.runtime.model.system import System
+from sysdyn.runtime.model.system import LARGE, System
 from sysdyn.runtime.numerics.ordering import Order, tall_order
 from sysdyn.runtime.numerics.saddle import saddle_order
 from sysdyn.runtime.numerics.tall import free_unknowns
@@ -30,16 +31,14 @@ from sysdyn.runtime.numerics.tall import free_unknowns
 LATER = 2000
 """Unknowns and rates from which the saddle-point matrix is made where a basis is not enough, not before: of a net its
 order of elimination alone costs what a pivoting does."""
-LARGE = 100_000
-"""The same from which a state is held within a basis."""
-FREE = 1e-4
+FREE = tuning.SLIGHT
 """Weight (of squares: its square) of unknowns that follow from the state."""
 RATES = ("momentum_rate", "gamma_rate", "gamma_acceleration", "dynamics_rate")
-DIFFERS = 2
+DIFFERS: int = _core.SD_DIFFERS
 """SD_DIFFERS (core/system/settle.h): an unknown whose differences from others are of the state."""
-LEFT_OUT = 3
+LEFT_OUT: int = _core.SD_LEFT_OUT
 """SD_LEFT_OUT (core/system/settle.h): a row that no point is asked to meet."""
-HELD = 1e8
+HELD = 1.0 / tuning.HALF_OF_ITS_DIGITS
 """Weight (of squares) of a state that moves only where the rows leave nothing else."""
 
 

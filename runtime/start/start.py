@@ -13,6 +13,7 @@ import itertools
 from collections.abc import Sequence
 
 import numpy as np
+from sysdyn.runtime import tuning
 from sysdyn.runtime.model.description import Floats, Ints, Places
 from sysdyn.runtime.model.failures import InconsistentStart, RowLabel, SolverFailure
 from sysdyn.runtime.model.held_rows import switch_rows
@@ -38,7 +39,6 @@ from sysdyn.runtime.start.strategies import (
     applicable,
     around,
     first,
-    hopeful,
 )
 from sysdyn.values import dataclass
 
@@ -46,9 +46,9 @@ NOTHING = 1e-100
 """Of any unit: what an iteration down a steep law leaves of zero."""
 HELD = "#held "
 """Before the name of a coordinate: what its flow and others hold together (compiler/forms/lowering.py)."""
-MOVED = 1e-6
+MOVED = tuning.UNSEEN
 """Of its magnitude: what a fixed value that is in the way has to move by, at least."""
-BESIDE = 1e-3
+BESIDE = tuning.SMALL
 """Of the move of the fixed value most in the way: what moves by less is not."""
 QUICK = 0.3
 """Times what a search may take: what one may that is asked for quickly; those that succeed take at most 0.1."""
@@ -220,13 +220,11 @@ def _number(starter: Starter, rows: Mask, unknowns: Mask) -> Places:
     return np.bincount(starter.rows[take], minlength=starter.settled.rows)
 
 
-def _attempt(starter: Starter, t: float, guess: Floats, free: Mask, most: int | None = None) -> tuple[Solution, str]:
-    """The first strategy that holds, of all or as many, from the guess, and its name; the least residual and "" where
-    none does.
-    """
+def _attempt(starter: Starter, t: float, guess: Floats, free: Mask, *, quickly: bool = False) -> tuple[Solution, str]:
+    """The first strategy that holds, from the guess, and its name; the least residual and "" where none does."""
     x = _finite(starter, t, _begun(starter, t, guess, free), free)
     best = Solution(x, np.inf)
-    for name, strategy in hopeful(starter, t, x, free, itertools.islice(applicable(starter, t, x), most)):
+    for name, strategy in applicable(starter, t, x, free, quickly=quickly):
         found, holds = first(strategy(starter, t, x, guess, free), x)
         again, sure = anew(starter, t, found, x, guess, free)
         with starter.granted():  # what led there has taken its own
@@ -378,7 +376,7 @@ def _sought(starter: Starter, t: float, guess: Floats, *, quickly: bool, silent:
     if silent and not starter.jumping and no_start(starter, t, guess, starter.free):
         raise InconsistentStart("stuck", float("inf"))
     budget = starter.work.budget
-    best, strategy = _attempt(starter, t, guess, starter.free, 1 if quickly else None)
+    best, strategy = _attempt(starter, t, guess, starter.free, quickly=quickly)
     if strategy:
         return best, strategy
     if quickly or starter.jumping:

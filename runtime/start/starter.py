@@ -18,8 +18,9 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+from sysdyn.runtime import tuning
 from sysdyn.runtime.model import core_library as lib
-from sysdyn.runtime.model.balance import LARGEST, Balance
+from sysdyn.runtime.model.balance import Balance
 from sysdyn.runtime.model.description import START, Floats, Initial, Ints, Places, stated
 from sysdyn.runtime.model.failures import InconsistentStart, RowLabel
 from sysdyn.runtime.model.inertia import Inertia, own_unknown
@@ -35,7 +36,7 @@ from sysdyn.runtime.start.sums import Sums, Weights, of_few, of_many, weights
 
 Mask = NDArray[np.bool_]
 STATE = ("q", "f", "p", "s", *START)
-NOISE = 1e-13
+NOISE = tuning.BY_FACTORS
 DRIFT = 0.55
 """Of what a state moves by in a step, behind one of half its length: with no more it drifts, and has not jumped."""
 WRITTEN = 4.0 * float(np.finfo(float).eps)
@@ -51,7 +52,7 @@ def remembered(
 
     @functools.wraps(ask)
     def answer(self: Starter, t: float, x: Floats) -> NDArray[Any]:
-        here = t, self.generous, sha256(np.ascontiguousarray(x).data).digest() if x.size > LARGE else x.tobytes()
+        here = t, sha256(np.ascontiguousarray(x).data).digest() if x.size > LARGE else x.tobytes()
         if here != self.here:
             self.here = here
             self.known.clear()
@@ -73,11 +74,10 @@ class Starter:
 
     def __init__(self, system: System) -> None:
         self.system = system
-        self.here, self.known = (0.0, False, b""), dict[str, NDArray[Any]]()
+        self.here, self.known = (0.0, b""), dict[str, NDArray[Any]]()
         self.work, self._residue = Work(), Residue()  # of one search for a start
         self.led = 0  # of the ways to what follows from a state the one that led there last (held.following)
         self.jumping = False  # what is free of the state is what jumps, and no more (`jump_alone`)
-        self.generous = False  # magnitudes by the largest proposal: where the least lead nowhere
         self.settled = settled = system.another("start")
         if system.unknowns > LARGE:  # found again where it is asked
             system.put_away(whole=True)
@@ -361,9 +361,7 @@ class Starter:
 
     @remembered
     def scale(self, t: float, x: Floats) -> Floats:
-        """Magnitudes of x, found by balancing rows where the guess is zero: the least that a row proposes; the largest
-        (rates of fast and slow stores 1e12 apart) where generous.
-        """
+        """Magnitudes of x, found by balancing rows where the guess is zero: the least that a row proposes."""
         known, found, nominal = self.equations, np.zeros(x.size), self.settled.named
         x = np.ascontiguousarray(x, dtype=np.float64)
         values, free = self.jacobian(t, x), self._residue.cleared(self, t, self.residual(t, x))
@@ -375,7 +373,7 @@ class Starter:
         sized = values - told if missed.size or not values.flags.writeable else values
         # how fast what follows from the state moves says nothing of its size
         tables = lib.pointer(known.rated_rows), lib.pointer(known.member), known.members
-        sizes = lib.pointer(x), lib.pointer(sized), lib.pointer(free), LARGEST * self.generous, lib.pointer(found)
+        sizes = lib.pointer(x), lib.pointer(sized), lib.pointer(free), lib.pointer(found)
         if lib.core.sd_scale(c.addressof(self._balance), lib.pointer(nominal), self.n, *tables, *sizes):
             raise MemoryError
         if missed.size:  # what guesses of one unit miss is measured alike

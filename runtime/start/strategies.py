@@ -6,32 +6,31 @@ Magnitudes that prove wrong on the way are taken anew.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import replace
 
 import numpy as np
+from sysdyn.runtime import tuning
 from sysdyn.runtime.model.description import Floats, Ints
 from sysdyn.runtime.model.inertia import own_unknown
 from sysdyn.runtime.numerics.gauss_newton import CORRECTED, Solution, solve, stepped
 from sysdyn.runtime.numerics.least_change import DENSE, least_norm
 from sysdyn.runtime.start.corrections import EXACT, by_corrections
-from sysdyn.runtime.start.equations import HIDDEN
 from sysdyn.runtime.start.flat import OWN, off_the_flat, without_rates
 from sysdyn.runtime.start.held import CLOSED, RESCALINGS, following, least_change, own_residual, rescaled, tidied
 from sysdyn.runtime.start.least import problem_of
 from sysdyn.runtime.start.linearly import contradicting
 from sysdyn.runtime.start.starter import Mask, Starter
 
-_AMPLITUDES = (1e-2, 1e-1, 1.0, 1e-4, 10.0, 1e-6, 1e2, 1e-1, 1.0, 10.0)
-WALKED = 0.2
-"""Share of the work of a search that walking down steep laws may take."""
-LEAST_PART = 1e-6
-"""Of misses: less is not faded out at once."""
-BRACKETS = 10.0 ** np.arange(-6, 10)
-"""Of the size of an unknown: how far from where it is a row is looked at for another sign."""
-HALVINGS = 100
-"""More than a double has digits between two arguments of unlike size."""
-FOLLOWED, NEARLY = 12, 1e-4
+_AMPLITUDES = tuple(10.0**power for power in (-2, -1, 0, -4, 1, -6, 2))
+"""Of magnitudes: how far points around lie, the likelier first."""
+STRAIGHT_ON, ALONG = 0.5, 2.0
+"""Of the work of a search: what Newton's method may take before a homotopy is asked (twice what the hardest start of
+the models does), and a homotopy (eight TTL gates between potentials: 1.8).
+"""
+FIRST_PART, LEAST_PART = 0.1, 1e-5
+"""Of misses: what is faded out first; less is not faded out at once (chains of 2 to 8 TTL gates ask for 0.006)."""
+FOLLOWED, NEARLY = 20, tuning.SLIGHT
 """Iterations in which Newton's method follows what fades, and the scaled residual at which it has."""
 
 
@@ -78,12 +77,12 @@ def _on_its_rows(starter: Starter, t: float, x: Floats, guess: Floats, state: Ma
 
 def _newton(starter: Starter, t: float, x: Floats, guess: Floats, free: Mask) -> Tries:
     """What follows from the state alone, by Newton's method, the state as guessed, then as rows without rates have it;
-    where that is not enough everything, the least first: a guess rounded to ten digits satisfies rows nearly, and a
-    stiff model pays for the rest with its first step.
+    where that nearly holds everything: a guess rounded to ten digits satisfies rows nearly, and a stiff model pays for
+    the rest with its first step.
     """
     follows, nearly = free & starter.following(t, x), False
     for begun in _states(starter, t, x, guess, free, follows):
-        with starter.granted():
+        with starter.granted(STRAIGHT_ON):
             found, nearly = following(starter, t, begun, guess, free, follows)
         exact = nearly and (found.residual <= CLOSED or own_residual(starter, t, found.x, found.x) <= CLOSED)
         near = None if exact else _by_corrections(starter, t, found, follows)
@@ -92,15 +91,22 @@ def _newton(starter: Starter, t: float, x: Floats, guess: Floats, free: Mask) ->
             break
     if starter.jumping and (near := _by_corrections(starter, t, Solution(x, 0.0), free)) is not None:
         yield near, True
-    with starter.granted():  # what a state that contradicts has taken is not missed then
-        everything = rescaled(starter, t, x, guess, free)
-    if nearly and x.size <= DENSE:
-        moved = np.abs(everything[0].x - found.x) > OWN * starter.largest_alike(starter.scale(t, found.x))
+    if not nearly:
+        return
+    everything, holds = next(_moved(starter, t, x, guess, free))
+    if x.size <= DENSE:
+        moved = np.abs(everything.x - found.x) > OWN * starter.largest_alike(starter.scale(t, found.x))
         if (moved & ~follows).any():  # to another root
             yield found, True
+    yield everything, holds
+    yield found, True
+
+
+def _moved(starter: Starter, t: float, x: Floats, guess: Floats, free: Mask) -> Tries:
+    """Everything by Newton's method, the state by its least change."""
+    with starter.granted(STRAIGHT_ON):  # what a state that contradicts has taken is not missed then
+        everything = rescaled(starter, t, x, guess, free)
     yield everything
-    if nearly:
-        yield found, True
 
 
 def _states(starter: Starter, t: float, x: Floats, guess: Floats, free: Mask, follows: Mask) -> Iterator[Floats]:
@@ -135,13 +141,6 @@ def _by_corrections(starter: Starter, t: float, found: Solution, free: Mask) -> 
     return Solution(near.x, residual)
 
 
-def _as_written(starter: Starter, t: float, x: Floats) -> Mask:
-    """Rows as written and such derivatives as are linear: far from a solution the derivative of an exponential hides
-    what itself is after.
-    """
-    return starter.every & ~(starter.groups(*HIDDEN) & _bent(starter, t, x))
-
-
 def _completed(starter: Starter, t: float, x: Floats, guess: Floats, free: Mask) -> tuple[Solution, bool]:
     """From a point at which rows as written hold: rates, which follow from the rest by linear rows; where that is not
     all, everything at once.
@@ -157,28 +156,71 @@ def _completed(starter: Starter, t: float, x: Floats, guess: Floats, free: Mask)
     return rescaled(starter, t, x, guess, free, sized=sized)
 
 
-def _walked(starter: Starter, t: float, x: Floats, guess: Floats, free: Mask) -> Tries:
-    """Down steep laws on the rows as written, with a share of work of its own; then everything."""
-    rows = _as_written(starter, t, x)
-    with starter.granted(WALKED):
-        for _ in range(RESCALINGS):
-            found = solve(problem_of(starter, t, x, guess, rows=rows, free=free), x)
-            if not np.isfinite(found.residual) or (found.x == x).all():
-                break
-            x = found.x
-    yield _completed(starter, t, x, guess, free)
-
-
-def _led(starter: Starter, t: float, x: Floats, guess: Floats, free: Mask) -> Tries:
-    """Along what fades of the misses of rows as written, as fast as Newton's method follows, the state held if that
-    will do; then everything (Newton's homotopy: Allgower and Georg 1990): of a jump, its rise drawn out.  With work of
-    its own.
+def _faded_out(starter: Starter, t: float, x: Floats, guess: Floats, free: Mask) -> Tries:
+    """What follows from the state along what fades of the misses at x of rows without rates, as fast as Newton's method
+    follows, then by all rows (Newton's homotopy: Allgower and Georg 1990): of a jump, its rise drawn out.
     """
+    if (follows := _following_from(starter, t, x, free)) is not None:
+        yield from _along(starter, t, (x, x), guess, follows)
+
+
+def _risen(starter: Starter, t: float, x: Floats, guess: Floats, free: Mask) -> Tries:
+    """The same from nothing, where sources and what stores hold rise (source stepping: Nagel 1975): at rest no law is
+    steep.
+    """
+    if x.any() and (follows := _following_from(starter, t, x, free)) is not None:
+        yield from _along(starter, t, (np.zeros_like(x), x), guess, follows)
+
+
+def _between(starter: Starter, t: float, x: Floats, guess: Floats, free: Mask) -> Tries:
+    """The same from where flows of which nothing is said are between those beside them: a node guessed at 0 V below one
+    at 400 V lies where no slope of a junction is left, or beyond the largest number.
+    """
+    follows = _following_from(starter, t, x, free)
+    near = None if follows is None else _evened(starter, t, x, follows)
+    if near is not None and follows is not None:
+        yield from _along(starter, t, (near, near), guess, follows)
+
+
+def _moved_along(starter: Starter, t: float, x: Floats, guess: Floats, free: Mask) -> Tries:
+    """Everything along what fades of the misses at x."""
+    yield from _along(starter, t, (x, x), guess, free)
+
+
+def _following_from(starter: Starter, t: float, x: Floats, free: Mask) -> Mask | None:
+    """What follows from the state; None where rows that are linear in it, or those of the state alone, contradict."""
     follows = free & starter.following(t, x)
-    for may in (follows, free) if (follows != free).any() else (free,):
-        with starter.granted():
-            found = _completed(starter, t, _at_the_end(starter, t, x, may), guess, may)
+    contradict = _beyond(starter, t, x, follows) or contradicting(starter, t, x, follows) is not None
+    return None if contradict else follows
+
+
+def _along(starter: Starter, t: float, way: tuple[Floats, Floats], guess: Floats, free: Mask) -> Tries:
+    """What the homotopy leads to, by all rows; with work of its own."""
+    with starter.granted(ALONG):
+        end = _at_the_end(starter, t, way, free)
+        found = None if end is None else _completed(starter, t, end, guess, free)
+    if found is not None:
         yield found
+
+
+def _at_the_end(starter: Starter, t: float, way: tuple[Floats, Floats], free: Mask) -> Floats | None:
+    """Where the homotopy leads that draws what is not free along from the begin of the way to its end; None where it
+    does not lead there.
+    """
+    (at, end), rows = way, without_rates(starter)
+    begun, free, miss, done, part = at, free & starter.read(rows), starter.residual(t, at), 0.0, FIRST_PART
+    grows = True  # but for the first part behind one that did not lead on
+    if not np.isfinite(miss[rows]).all():
+        return None
+    while done < 1.0 and part > LEAST_PART and not starter.work.done:
+        to = min(done + part, 1.0)
+        drawn = np.where(free, at, begun + to * (end - begun))
+        found = _followed(starter, t, drawn, (rows, free), _faded(starter, t, (1.0 - to) * miss))
+        if found is None:
+            part, grows = 0.5 * part, False
+            continue
+        at, done, part, grows = found, to, 2.0 * part if grows else part, True
+    return at if done == 1.0 else None
 
 
 def _faded(starter: Starter, t: float, miss: Floats) -> Callable[[Floats], Floats]:
@@ -186,30 +228,23 @@ def _faded(starter: Starter, t: float, miss: Floats) -> Callable[[Floats], Float
     return lambda x: starter.residual(t, x) - miss
 
 
-def _at_the_end(starter: Starter, t: float, x: Floats, free: Mask) -> Floats:
-    """Where the homotopy leads; as far as it got where work is over."""
-    every, miss, done, part = _as_written(starter, t, x), starter.residual(t, x), 0.0, 0.5
-    while done < 1.0 and part > LEAST_PART and not starter.work.done:
-        left = _faded(starter, t, max(1.0 - done - part, 0.0) * miss)
-        rows = problem_of(starter, t, x, x, rows=every, free=free)
-        found = solve(replace(rows, residual=left, core=None), x, FOLLOWED)
-        follows = found.residual < NEARLY
-        x, done, part = (found.x, done + part, 2.0 * part) if follows else (x, done, 0.25 * part)
-    return solve(problem_of(starter, t, x, x, rows=every, free=free), x).x
-
-
-def _between(starter: Starter, t: float, x: Floats, guess: Floats, free: Mask) -> Tries:
-    """By Newton's method, and down steep laws, from where flows of which nothing is said are between those beside them:
-    a node guessed at 0 V below one at 400 V lies where no slope of a junction is left, or beyond the largest number.
-    With work of its own.
+def _followed(
+    starter: Starter, t: float, x: Floats, what: tuple[Mask, Mask], left: Callable[[Floats], Floats]
+) -> Floats | None:
+    """From x where these rows, in what is free, nearly hold in magnitudes of their own; None where Newton's method does
+    not get there.
     """
-    near = _evened(starter, t, x, free)
-    if near is None:
-        return
-    for way in (_newton, _walked):
-        with starter.granted():
-            found = first(way(starter, t, near, guess, free), near)
-        yield found
+    rows, free = what
+    for _ in range(RESCALINGS):
+        problem = replace(problem_of(starter, t, x, x, rows=rows, free=free), residual=left, core=None)
+        found = solve(problem, x, FOLLOWED)
+        if not found.residual < NEARLY:
+            return None
+        x = found.x
+        own = np.abs(left(x)) * starter.row_scale(t, x, starter.scale(t, x))
+        if (own[rows] < NEARLY).all():
+            return x
+    return None
 
 
 def _evened(starter: Starter, t: float, x: Floats, free: Mask) -> Floats | None:
@@ -244,73 +279,6 @@ def _numbered(places: Ints, used: Mask) -> Ints:
     return (np.cumsum(used) - 1)[places]
 
 
-def _substituted(starter: Starter, t: float, x: Floats, guess: Floats, free: Mask) -> Tries:
-    """By Newton's method from where forward substitution leads: rows as written that read one unknown which is not
-    known yet determine it, one after another.  Behind a switch that opens on a coil the current of a diode is the
-    coil's, and its effort the one at which its law carries that, e = vT ln(1 + f/Is), however flat it is at the guess.
-    """
-    near, unknown = x.copy(), free & starter.following(t, x)
-    rows, multipliers = starter.settled.held  # which read "multiplier = 0"
-    stands = ~np.isin(starter.rows, rows) | np.isin(starter.columns, multipliers)
-    row, column = starter.rows[stands], starter.columns[stands]
-    left = _as_written(starter, t, x)
-    while True:
-        counts = np.bincount(row[unknown[column]], minlength=left.size)
-        places = np.flatnonzero((left & (counts == 1))[row] & unknown[column])
-        if not places.size:
-            break
-        at = places[0]
-        left[row[at]] = unknown[column[at]] = False
-        if (root := _root_of_row(starter, t, near, int(row[at]), int(column[at]))) is None:
-            return
-        near[column[at]] = root
-    if (near != x).any():
-        with starter.granted():
-            found = first(_newton(starter, t, near, guess, free), near)
-        yield found
-
-
-def _root_of_row(starter: Starter, t: float, x: Floats, row: int, column: int) -> float | None:
-    """Where a row is zero along one unknown, nearest to where that is: by bisection, for a law may be flat or beyond
-    the largest number on the way.  None where its sign does not change.
-    """
-    here, at = x.copy(), float(x[column])
-
-    def value(z: float) -> float:
-        here[column] = z
-        with np.errstate(all="ignore"):
-            return float(starter.residual(t, here)[row])
-
-    begun = value(at)
-    if begun == 0.0:
-        return at
-    size = max(float(starter.scale(t, x)[column]), abs(at))
-    for part in BRACKETS:
-        for low in (at + part * size, at - part * size):
-            if value(low) * begun <= 0.0:
-                return _bisected(value, low, at, begun)
-    return None
-
-
-def _bisected(value: Callable[[float], float], low: float, high: float, above: float) -> float:
-    """The zero between two arguments, with the value at `high`, to the last digit or HALVINGS of their distance."""
-    for _ in range(HALVINGS):
-        middle = 0.5 * (low + high)
-        if middle in (low, high):
-            break
-        if value(middle) * above > 0.0:
-            high = middle
-        else:
-            low = middle
-    return low
-
-
-def _perturbed(starter: Starter, t: float, x: Floats, guess: Floats, free: Mask) -> Tries:
-    """Everything at once from points around: where a guess lies on a singular point."""
-    for beside in around(starter, t, x, free):
-        yield rescaled(starter, t, beside, guess, free)
-
-
 def around(starter: Starter, t: float, x: Floats, free: Mask) -> Iterator[Floats]:
     """Points around, always the same, as long as there is work left."""
     random = np.random.default_rng(20)
@@ -320,51 +288,37 @@ def around(starter: Starter, t: float, x: Floats, free: Mask) -> Iterator[Floats
         yield x + np.where(free, amplitude * starter.scale(t, x) * random.standard_normal(x.size), 0.0)
 
 
-def _in_largest_scales(starter: Starter, t: float, x: Floats, guess: Floats, free: Mask) -> Tries:
-    """Everything at once in the largest scales that rows propose, with work of its own; kept where it succeeds."""
-    starter.generous = True
-    with starter.granted():
-        found, holds = rescaled(starter, t, x, guess, free)
-    starter.generous = holds
-    if holds:
-        yield found, True
-
-
 STRATEGIES: tuple[tuple[str, Strategy], ...] = (
     ("newton", _newton),
-    ("rows_as_written", _walked),
-    ("homotopy", _led),
-    ("between", _between),
-    ("perturbed_guess", _perturbed),
-    ("largest_scales", _in_largest_scales),
+    ("homotopy", _faded_out),
+    ("homotopy", _risen),
+    ("homotopy", _between),
+    ("newton", _moved),
+    ("homotopy", _moved_along),
 )
-"""Globalisation: what is tried, in this order, until all rows hold."""
+"""Globalisation: what is tried, in this order, until all rows hold: the state as it is before it moves."""
 
 
-def applicable(starter: Starter, t: float, x: Floats) -> Iterator[tuple[str, Strategy]]:
-    """Of these, what may help from x: rows that are all linear hold at once or nowhere, but for magnitudes."""
-    yield STRATEGIES[0]
-    bent = bool(starter.settled.form.scales) or bool(_bent(starter, t, x).any())  # slopes of steep laws underflow
-    yield from (named for named in STRATEGIES[1:] if bent or named[1] is _in_largest_scales)
-
-
-def hopeful(
-    starter: Starter, t: float, x: Floats, free: Mask, named: Iterable[tuple[str, Strategy]]
+def applicable(
+    starter: Starter, t: float, x: Floats, free: Mask, *, quickly: bool = False
 ) -> Iterator[tuple[str, Strategy]]:
-    """Of these, where the first has failed, what helps against linear rows that contradict: other magnitudes."""
-    for k, (name, strategy) in enumerate(named):
-        if k == 1 and strategy is not _in_largest_scales and contradicting(starter, t, x, free) is not None:
-            yield STRATEGIES[-1]
-            return
-        yield name, strategy
+    """Of these, what may help from x: rows that are all linear hold at once or nowhere, and no homotopy leads to where
+    linear rows contradict.  quickly: Newton's method alone.
+    """
+    bent = False
+    for k, (name, strategy) in enumerate(STRATEGIES):
+        if k == 1 and not quickly:  # slopes of steep laws underflow
+            bent = bool(starter.settled.form.scales) or bool(_bent(starter, t, x).any())
+            bent = bent and contradicting(starter, t, x, free) is None
+        if bent or name == "newton":
+            yield name, strategy
 
 
 def behind(starter: Starter, t: float, x: Floats, free: Mask) -> Floats | None:
     """A point behind a jump at which all rows hold that must, from x; None where none was found.  A step of 10 V across
     a diode makes steep laws lie far behind it.
     """
-    some = {way for _, way in applicable(starter, t, x)}
-    ways = (way for way in (_newton, _substituted, _walked, _led, _between) if way is _substituted or way in some)
+    ways = [way for _, way in applicable(starter, t, x, free)]
     with np.errstate(all="ignore"):  # an exponential may be beyond the largest number on the way, where nothing holds
         found, holds = first((found for way in ways for found in way(starter, t, x, x, free)), x)
     return found.x if holds else None

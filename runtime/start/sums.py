@@ -7,6 +7,7 @@ follows from the balances, summed so that the rates go.  A sum stands in the pla
 from __future__ import annotations
 
 import numpy as np
+from sysdyn.runtime import tuning
 from sysdyn.runtime.model.description import Floats, Places
 from sysdyn.runtime.model.inertia import Inertia
 from sysdyn.runtime.numerics.components import components
@@ -15,7 +16,7 @@ from sysdyn.runtime.numerics.products import add_product, add_sizes
 from sysdyn.runtime.numerics.rank import left_null_vectors, null_space
 from sysdyn.values import dataclass
 
-CANCELS = 1e-14
+CANCELS = tuning.BY_SUMS
 """Of the terms of a sum: what is less is left of them by round-off, and no coefficient."""
 Entries = tuple[Places, Places]
 

@@ -70,13 +70,13 @@ def test_nearly_all_starts_need_the_first_strategy_alone(pattern, formulations):
 
 @pytest.mark.long
 def test_a_run_says_by_which_strategy_its_start_was_found(tmp_path):
-    """A diode guessed beyond the range of exponentials is started from beside the guess."""
+    """A diode guessed beyond the range of exponentials is started from rest."""
     text = (GALLERY / "diode_circuit.sd").read_text().replace("~ 0 V", "~ 100 V")
     ran, _ = attempt(tmp_path, text.replace("sin(2*pi*50 Hz*t)", "cos(2*pi*50 Hz*t)"))
-    assert ran.started.state.strategy == "perturbed_guess"
-    assert strategy_note(ran.started.state) == f"the start was found {SOUGHT['perturbed_guess']} (perturbed_guess)"
-    assert Trace.open(tmp_path / "trace.h5").attributes["start_strategy"] == "perturbed_guess"
-    assert set(SOUGHT) == {name for name, _ in STRATEGIES[1:]}
+    assert ran.started.state.strategy == "homotopy"
+    assert strategy_note(ran.started.state) == f"the start was found {SOUGHT['homotopy']} (homotopy)"
+    assert Trace.open(tmp_path / "trace.h5").attributes["start_strategy"] == "homotopy"
+    assert {"newton", *SOUGHT} == {name for name, _ in STRATEGIES}
 
 
 HARD = {"scalar": (636, 992, 94003), "others": (13, 17, 44), "bare": (17, 24, 225, 257), "arrays": (52, 174, 233)}

@@ -8,7 +8,7 @@ import pytest
 from sysdyn.runtime.numerics import least_change as module
 from sysdyn.runtime.numerics.gauss_newton import Problem, least_residual, solve, stepped
 from sysdyn.runtime.numerics.least_change import in_order, least_measured, least_norm
-from sysdyn.runtime.numerics.work import EACH, EVALUATION, GRANTED, ITERATIONS, Budget, OutOfTimeError, Work
+from sysdyn.runtime.numerics.work import EACH, EVALUATION, FACTORS, GRANTED, ITERATIONS, Budget, OutOfTimeError, Work
 
 
 def entries(matrix):
@@ -128,7 +128,7 @@ def test_work_is_counted_by_size_and_ends_by_the_clock():
     work = Work(share=0.5)
     while not work.done:
         work.iteration((2000, 2000), 10000)
-    one = 2e3 * 14000 + EVALUATION + EACH * 1e4
+    one = FACTORS + 2e3 * 14000 + EVALUATION + EACH * 1e4
     assert work.spent == pytest.approx(one * np.ceil(0.5 * max(GRANTED, ITERATIONS * one) / one), rel=1e-2)
     late = Work(budget=Budget(time.monotonic() - 1.0))
     with pytest.raises(OutOfTimeError):

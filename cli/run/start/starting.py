@@ -33,13 +33,7 @@ from sysdyn.runtime.structure.order import order_and_manifold
 from sysdyn.runtime.structure.structure import Structure, structure
 from sysdyn.values import dataclass
 
-SOUGHT = {
-    "rows_as_written": "down steep laws, from the equations without their derivatives",
-    "homotopy": "along what fades of the misses at the guess",
-    "between": "from where what nothing is said of lies between its neighbours",
-    "perturbed_guess": "from a point beside the guess",
-    "largest_scales": "in the largest scales that the equations propose",
-}
+SOUGHT = {"homotopy": "by a homotopy: sources rise from nothing, or what the guess misses fades"}
 """What the summary says of a start by its strategy (runtime/start); nothing of the plain one."""
 
 

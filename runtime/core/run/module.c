@@ -2,10 +2,12 @@
  * is asked some hundred times a run, and ctypes' own ways take five times as long. */
 #include <Python.h>
 
+#include "linear/dense/graded.h"
 #include "linear/tuning.h"
 #include "run/events/fits.h"
 #include "run/many/many.h"
-#include "start/magnitudes.h"
+#include "start/search.h"
+#include "system/settle.h"
 #include "steppers/bdf/bdf.h"
 #include "steppers/energy/energy.h"
 #include "steppers/explicit/dopri.h"
@@ -72,6 +74,13 @@ static const struct {
     {"SD_LEDGER_ROWS", SD_LEDGER_ROWS},
     {"SD_LARGEST", SD_LARGEST},
     {"SD_CAPPED", SD_CAPPED},
+    {"SD_DIFFERS", SD_DIFFERS},
+    {"SD_MISSED", SD_MISSED},
+    {"SD_LEFT_OUT", SD_LEFT_OUT},
+    {"SD_ITERATIONS", SD_ITERATIONS},
+    {"SD_HALVINGS", SD_HALVINGS},
+    {"SD_LOST", SD_LOST},
+    {"SD_FOLDS", SD_FOLDS},
     {"SD_MAX_ORDER", SD_MAX_ORDER},
     {"SD_ENERGY_STAGES", SD_ENERGY_STAGES},
     {"SD_DOPRI_ALL", SD_DOPRI_ALL},
@@ -103,6 +112,9 @@ static const struct {
     {"SD_SMALL", SD_SMALL},
     {"SD_PIVOT", SD_PIVOT},
     {"SD_GENERIC", SD_GENERIC},
+    {"SD_GRANTED", SD_GRANTED},
+    {"SD_EVALUATION", SD_EVALUATION},
+    {"SD_EACH", SD_EACH},
     {"ROUNDING", ROUNDING},
     {"FALLEN", FALLEN},
 };

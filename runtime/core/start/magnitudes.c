@@ -1,15 +1,16 @@
 #include "start/magnitudes.h"
 
+#include "linear/tuning.h"
+
 #include <stdlib.h>
 #include <string.h>
 
 #define SWEEPS 8
-#define SMALL 1e-3      /* of the largest coefficient of its row and kind: it proposes much, and is asked last */
-#define DUST 1e-11      /* the same: what is left of a zero, and is never asked */
-#define NOTHING 1e-280  /* less is no magnitude */
-#define BORNE 1e3       /* times what balances a steep row, or what it is at the point: what a proposal may make of it */
-#define TENTH 0.1       /* of a proposal that a steep law does not bear: the next one */
-#define SHORTER 320     /* of them: from the largest double to one */
+#define SMALL SD_SMALL /* of the largest coefficient of its row and kind: it proposes much, and is asked last */
+#define DUST SD_DEPENDENT /* the same: what is left of a zero, and is never asked */
+#define NOTHING 1e-280 /* less is no magnitude */
+#define TENTH 0.1 /* of a proposal that a steep law does not bear: the next one */
+#define SHORTER 320 /* of them: from the largest double to one */
 
 /* small [entries] := 1 where a coefficient is small beside the largest of its row and kind, 2 where it is none; line [rows]: room.  Entries of
  * a kind lie beside each other, for unknowns do. */
@@ -86,7 +87,7 @@ static void slopes_beside(const sd_balance *m, const sd_bearing *bearing, int wa
     sd_slopes(bearing->system, bearing->t, moved, bearing->yd, 0, slopes);
 }
 
-/* Proposals best [unknowns] of a sweep are shortened until none, by the slopes that it leads to, makes BORNE times what
+/* Proposals best [unknowns] of a sweep are shortened until none, by the slopes that it leads to, makes 1 / SMALL times what
  * balances a steep row (line [rows], where it is known), or of its terms at the point. */
 static void bear(const sd_balance *m, const sd_bearing *bearing, const double *size, const double *line,
                  const double *found, double *best)
@@ -95,7 +96,7 @@ static void bear(const sd_balance *m, const sd_bearing *bearing, const double *s
     char *heavy = (char *)(slopes + m->entries); /* [unknowns] */
     sd_steep_terms(bearing->system, bearing->t, bearing->y, bearing->yd, limit);
     for (int32_t r = 0; r < m->rows; r++)
-        limit[r] = limit[r] != 0.0 && line[r] > 0.0 ? BORNE * sd_larger(limit[r], line[r]) : INFINITY;
+        limit[r] = limit[r] != 0.0 && line[r] > 0.0 ? sd_larger(limit[r], line[r]) / SMALL : INFINITY;
     for (int pass = 0, changed = 1; pass < SHORTER && changed; pass++) {
         memset(heavy, 0, (size_t)m->unknowns);
         for (int way = 1; way >= -1; way -= 2) {
@@ -186,7 +187,7 @@ int sd_propagate_beside(const sd_balance *m, const double *size, const char *sma
 }
 
 int sd_scale(const sd_balance *m, const double *nominal, int32_t first, const char *rated, const int32_t *member,
-             int32_t members, const double *x, double *jacobian, double *residual, int32_t flags, double *scale)
+             int32_t members, const double *x, double *jacobian, double *residual, double *scale)
 {
     double *most = calloc((size_t)members + 1, sizeof *most);
     if (!most)
@@ -198,7 +199,7 @@ int sd_scale(const sd_balance *m, const double *nominal, int32_t first, const ch
     for (int32_t e = 0; e < m->entries; e++)
         jacobian[e] = isfinite(jacobian[e]) ? fabs(jacobian[e]) : 0.0;
     char *small = sd_small(m, jacobian);
-    int failed = small ? sd_propagate_beside(m, jacobian, small, residual, rated, NULL, flags, scale) : -1;
+    int failed = small ? sd_propagate_beside(m, jacobian, small, residual, rated, NULL, 0, scale) : -1;
     /* unknowns of y are no less than a thousandth of their like */
     for (int32_t k = 0; k < first; k++)
         most[member[k]] = sd_larger(most[member[k]], scale[k]);
@@ -206,7 +207,7 @@ int sd_scale(const sd_balance *m, const double *nominal, int32_t first, const ch
         scale[k] = sd_larger(scale[k], SMALL * most[member[k]]);
         scale[k] = scale[k] > NOTHING ? scale[k] : 1.0;
     }
-    failed |= small ? sd_propagate_beside(m, jacobian, small, residual, NULL, NULL, flags, scale) : -1;
+    failed |= small ? sd_propagate_beside(m, jacobian, small, residual, NULL, NULL, 0, scale) : -1;
     free(small);
     for (int32_t k = 0; k < m->unknowns; k++)
         scale[k] = scale[k] > NOTHING ? scale[k] : 1.0;

@@ -59,7 +59,7 @@ int sd_propagate_beside(const sd_balance *balance, const double *size, const cha
  * magnitudes (what is no number counts as 0).  nominal [first]: 0 where there is none, NULL: nowhere; first: unknowns before the rates; rated [rows]: rows that say nothing of sizes
  * at first; member [first], members: number of the kind of an unknown.  Returns 0; -1: no memory. */
 int sd_scale(const sd_balance *balance, const double *nominal, int32_t first, const char *rated, const int32_t *member,
-             int32_t members, const double *x, double *jacobian, double *residual, int32_t flags, double *scale);
+             int32_t members, const double *x, double *jacobian, double *residual, double *scale);
 
 /* size [points][sizes] := largest |entry| of dF/dy at (t, y [points][extended], yd) among those of each number: entry
  * [entries] places in the pattern, of [entries] their numbers; -1: no memory */

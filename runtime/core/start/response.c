@@ -1,21 +1,22 @@
 #include "start/response.h"
 
+#include "linear/tuning.h"
+
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
 
-#define ENTRIES 20000   /* of a Jacobian: larger systems are left as they are */
-#define FACTORS 100     /* of one leg of the path */
+#define ENTRIES 20000 /* of a Jacobian: larger systems are left as they are */
+#define FACTORS 100 /* of one leg of the path */
 #define ITERATIONS 12
-#define CLOSE 1e-2      /* of an unknown: the last correction of Newton's method, ... */
-#define SMALL 0.5       /* ... the one before it, ... */
-#define SLOW 0.1        /* ... and of that: far above its load an exponential has corrections that are small beside the
+#define CLOSE 1e-2 /* of an unknown: the last correction of Newton's method, behind one of half of it at most, ... */
+#define SLOW 0.1 /* ... and of that: far above its load an exponential has corrections that are small beside the
                          * unknown and all alike.  Where they fall by less the factors are made anew. */
-#define EXACT 1e-8      /* of an unknown: the same where the row is linear */
-#define FIRST 0.125     /* of a leg: the first step along it */
+#define EXACT SD_HALF_OF_ITS_DIGITS /* of an unknown: the same where the row is linear */
+#define FIRST 0.125 /* of a leg: the first step along it */
 #define LONGEST 0.25
-#define SHORTEST 1e-6
-#define GROUP 1e-3      /* of their like: what is smaller is not followed to its own digits */
+#define SHORTEST SD_UNSEEN
+#define GROUP SD_SMALL /* of their like: what is smaller is not followed to its own digits */
 
 /* The path: a point (t, h, d), the work of Newton's method there. */
 typedef struct {
@@ -75,7 +76,7 @@ static int converged(path *p, double t, double h, int fresh)
             return 0;
         double now = correction(p);
         int fast = now <= SLOW * last;
-        if (now <= EXACT || (now <= CLOSE && last <= SMALL && fast))
+        if (now <= EXACT || (now <= CLOSE && last <= 0.5 && fast))
             return 1;
         fresh = fast && iteration > 0;
         last = now;

@@ -1,5 +1,6 @@
 /* What round-off leaves open of unknowns: see round_off.h. */
 #include "start/round_off.h"
+#include "linear/tuning.h"
 #include "start/magnitudes.h"
 
 #include <float.h>
@@ -7,7 +8,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-#define TELLS 1e-3 /* of the largest part that an unknown has of any row: where it has less, the row says nothing of it */
+#define TELLS SD_SMALL /* of the largest part that an unknown has of any row: where it has less, the row says nothing of it */
 
 int sd_unresolved(const sd_system *system, const uint8_t *constraint, const double *y, const double *jy, double *found)
 {

@@ -2,24 +2,18 @@
 
 #include "linear/dense/dense.h"
 #include "linear/dense/graded.h"
+#include "linear/tuning.h"
 
+#include <float.h>
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
 
-#define EMPTY 1e-160
-#define RANK 1e-11
-#define GRANTED 3.6e9
-#define ITERATIONS 40
-#define EVALUATION 1e6
-#define EACH 40.0
-#define HALVINGS 12
-#define FLATTEST 1023
-#define LOST 3
-#define FOLDS 709
-#define ROUND_OFF 2e-15
-#define BESIDE 1e-8
-#define STRAIGHT 1e-4
+#define EMPTY 1e-160 /* coefficients whose squares underflow say nothing */
+#define FLATTEST (DBL_MAX_EXP - 1)
+#define ROUND_OFF (8.0 * DBL_EPSILON)
+#define BESIDE SD_HALF_OF_ITS_DIGITS
+#define STRAIGHT SD_SLIGHT
 
 /* The rates yd [extended], and y as blocks read it, in room [extended] behind them: where they are compiled x serves, for they
  * know no audit families. */
@@ -140,7 +134,7 @@ static double measure(sd_search *s, const double *x, room *w, double *norm)
 {
     int32_t rows = s->start->balance.rows;
     double largest = 0.0, sum = 0.0;
-    s->spent += EVALUATION + EACH * s->start->balance.entries;
+    s->spent += SD_EVALUATION + SD_EACH * s->start->balance.entries;
     sd_start_residual(s->start, s->t, x, w->r);
     for (int32_t r = 0; r < rows; r++) {
         w->scaled[r] = s->use[r] ? w->r[r] * w->row_scale[r] : 0.0;
@@ -210,7 +204,7 @@ static int nearest(const sd_search *s, room *w, int beside)
             w->work[(size_t)i * n + j] /= size;
         w->aim[i] = aim / power / size;
     }
-    int failed = sd_nearest(m, n, w->work, w->aim, RANK, w->target);
+    int failed = sd_nearest(m, n, w->work, w->aim, SD_DEPENDENT, w->target);
     for (int32_t j = 0; j < n && beside; j++)
         w->target[j] += w->u[j];
     return failed;
@@ -227,7 +221,7 @@ static int used(const sd_search *s, const double *r)
 static void count(sd_search *s, const room *w)
 {
     double rows = w->rows, unknowns = w->unknowns, entries = s->start->balance.entries;
-    double whole = 15.0 * rows * unknowns * fmin(rows, unknowns) + EVALUATION + EACH * entries;
+    double whole = 15.0 * rows * unknowns * fmin(rows, unknowns) + SD_EVALUATION + SD_EACH * entries;
     s->largest = fmax(s->largest, whole);
     s->spent += whole;
 }
@@ -262,7 +256,7 @@ static int ascends(const room *w, int32_t rows)
  * that blocks, and shall conduct); w->tried: about where they stop to, by bisection of the exponent */
 static int flat(sd_search *s, room *w, const double *x, double norm, double *now)
 {
-    int above = HALVINGS, below = FLATTEST;
+    int above = SD_HALVINGS, below = FLATTEST;
     while (below - above > 1) {
         int halvings = (above + below) / 2;
         *(tried(s, w, x, ldexp(1.0, -halvings)) <= norm ? &below : &above) = halvings;
@@ -275,7 +269,7 @@ static void iterate(sd_search *s, room *w, double *x)
 {
     size_t all = (size_t)s->start->balance.unknowns, rows = (size_t)s->start->balance.rows;
     int stale = 0, taken = 0, lost = 0;
-    for (int k = 0; k < s->most + FOLDS && taken != s->most && lost != LOST; k++) {
+    for (int k = 0; k < s->most + SD_FOLDS && taken != s->most && lost != SD_LOST; k++) {
         taken++;
         linearise(s, x, w);
         count(s, w);
@@ -291,7 +285,7 @@ static void iterate(sd_search *s, room *w, double *x)
         memcpy(w->begun, w->scaled, rows * sizeof *w->begun);
         if (size <= ROUND_OFF || !isfinite(size) || stale > (s->residual < 1e-12 ? 4 : 15))
             break;
-        if (s->spent > s->share * fmax(GRANTED, ITERATIONS * s->largest))
+        if (s->spent > s->share * fmax(SD_GRANTED, SD_ITERATIONS * s->largest))
             break;
         for (size_t c = 0; c < all; c++)
             if (w->column_at[c] >= 0)
@@ -305,7 +299,7 @@ static void iterate(sd_search *s, room *w, double *x)
             break;
         double step = 1.0, now = INFINITY;
         int halvings = 0;
-        for (; halvings < HALVINGS; halvings++, step *= 0.5) {
+        for (; halvings < SD_HALVINGS; halvings++, step *= 0.5) {
             now = tried(s, w, x, step);
             if (isfinite(now) && now <= fmax((1.0 - 0.1 * step) * norm, 1e-11))
                 break;
@@ -314,7 +308,7 @@ static void iterate(sd_search *s, room *w, double *x)
             if (halvings == 1 && ascends(w, (int32_t)rows))
                 return;
         }
-        if (halvings == HALVINGS && !(flat(s, w, x, norm, &now))) {
+        if (halvings == SD_HALVINGS && !(flat(s, w, x, norm, &now))) {
             lost++;
             now = tried(s, w, x, 2.0 * step);
         } else

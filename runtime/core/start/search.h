@@ -1,13 +1,22 @@
 /* The search for a start on small models: rows of the settled form in few unknowns, by Gauss-Newton steps of least norm.
  *
- * What runtime/numerics/gauss_newton.py does for a Problem and runtime/start/starter.py for its rows, on full matrices;
- * every constant is that file's.
+ * What runtime/numerics/gauss_newton.py does for a Problem and runtime/start/starter.py for its rows, on full matrices.
  */
 #ifndef SYSDYN_SEARCH_H
 #define SYSDYN_SEARCH_H
 
 #include "system/assembly.h"
 #include "start/magnitudes.h"
+
+/* what a search may spend (runtime/numerics/work.py says what of) */
+#define SD_GRANTED 3.6e9
+#define SD_ITERATIONS 40
+#define SD_EVALUATION 1e6
+#define SD_EACH 40.0
+/* how it goes on (runtime/numerics/gauss_newton.py) */
+#define SD_HALVINGS 12
+#define SD_LOST 3
+#define SD_FOLDS 709
 
 /* The equations of a start.  Unknowns x [unknowns] = y as written and those of the start alone, the derivatives that occur. */
 typedef struct sd_rows_of_start {

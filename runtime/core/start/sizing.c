@@ -1,6 +1,7 @@
 #include "start/sizing.h"
 
 #include "linear/linear.h"
+#include "linear/tuning.h"
 #include "start/response.h"
 
 #include <float.h>
@@ -9,16 +10,16 @@
 #include <string.h>
 
 #define CANCELLED (64.0 * DBL_EPSILON) /* of a slope beside it: one that terms which cancel have left */
-#define ROUND_OFF 1e-12 /* of the largest of the same unit: smaller ones are what is left of a zero */
-#define NOTHING 1e-18   /* of the largest of the same kind and unit: less was written as a zero (starts clean what they leave) */
-#define FRESH 1e-9      /* of what a rate makes of a quantity in the time scale so far: a start below it is round-off */
-#define OUTLYING 1e3    /* times the largest of its like: a state that begins at zero and gets so far is none of them */
-#define UNKNOWN 1.0     /* magnitude of what is zero with all that could size it (scales.py) */
-#define GROUP 1e-3      /* of their like: the least that zeros count as (scales.py) */
-#define PART 1e-2       /* of the span: the time scale at most */
-#define NEVER 1e-9      /* of what a run confirmed: a content that was never larger is zero, and its size is not known */
-#define NOISE 1e-6      /* values below this part of what balances their rows are round-off, or zero by chance */
-#define QUIET 1e-9      /* efforts below this part of (largest energy) / q are round-off, and flows of their like */
+#define ROUND_OFF SD_CANCELS /* of the largest of the same unit: smaller ones are what is left of a zero */
+#define NOTHING 1e-18 /* of the largest of the same kind and unit: less was written as a zero (starts clean what they leave) */
+#define FRESH SD_SAME /* of what a rate makes of a quantity in the time scale so far: a start below it is round-off */
+#define INLYING SD_SMALL /* of what a state that begins at zero gets to: its like, if they are no larger, say nothing of it */
+#define UNKNOWN 1.0 /* magnitude of what is zero with all that could size it (scales.py) */
+#define GROUP SD_SMALL /* of their like: the least that zeros count as (scales.py) */
+#define PART 1e-2 /* of the span: the time scale at most */
+#define NEVER SD_SAME /* of what a run confirmed: a content that was never larger is zero, and its size is not known */
+#define NOISE SD_UNSEEN /* values below this part of what balances their rows are round-off, or zero by chance */
+#define QUIET SD_SAME /* efforts below this part of (largest energy) / q are round-off, and flows of their like */
 #define TINY (DBL_MIN * 1e30) /* less is no magnitude */
 
 /* The motion linearised at a start: entries of dF/dy, dF/dyd, rates (NULL: none of it is known), order of columns. */
@@ -81,7 +82,7 @@ int sd_relaxed(const sd_system *system, const sd_order *order, int32_t rungs, co
     return 0;
 }
 
-/* size [n] := the largest |y| of the like of each unknown; of a state that is zero, and gets OUTLYING times as far within
+/* size [n] := the largest |y| of the like of each unknown; of a state that is zero, and gets 1 / INLYING times as far within
  * `time`, how far that is (reach, by the motion linearised: sd_relaxed).  most [kinds]: room.  0; -1: no memory */
 static int like_sizes(const sd_sizing *s, const sd_system *system, double time, const double *y, const double *yd,
                       const sd_motion *motion, double *size, double *reach, double *most)
@@ -93,7 +94,7 @@ static int like_sizes(const sd_sizing *s, const sd_system *system, double time, 
     group_largest(b, size, most);
     for (int32_t k = 0; k < b->unknowns; k++) {
         double like = most[b->kind[k]];
-        int far = motion->rate && (s->kind[k] & SD_STATE) && size[k] <= NOTHING * like && OUTLYING * like < fabs(yd[k]) * time;
+        int far = motion->rate && (s->kind[k] & SD_STATE) && size[k] <= NOTHING * like && like < INLYING * fabs(yd[k]) * time;
         outlying |= far;
         size[k] = far ? -like : like;
     }
@@ -102,7 +103,7 @@ static int like_sizes(const sd_sizing *s, const sd_system *system, double time, 
         return -1;
     for (int32_t k = 0; k < b->unknowns && outlying; k++)
         if (size[k] < 0.0)
-            size[k] = reach[k] > -OUTLYING * size[k] ? reach[k] : -size[k];
+            size[k] = INLYING * reach[k] > -size[k] ? reach[k] : -size[k];
     return 0;
 }
 

@@ -369,7 +369,7 @@ int sd_graded(int32_t m, int32_t n, double *a, double *b, double *noise, double 
         pivots = eliminate(m, k, first, a, open, b, noise, missing, place);
         failed = !noise && (pivots < k || !(largest(m - k, b + k) <= AGREES * most));
         if (noise)
-            left = missed(m - pivots, b + pivots, noise + pivots) ? 2 : doubtful(m, k, a, open, pivots) ? 3 : 0;
+            left = missed(m - pivots, b + pivots, noise + pivots) ? SD_MISSED : doubtful(m, k, a, open, pivots) ? SD_DOUBTFUL : SD_DETERMINED;
     }
     if (!failed) {
         substitute(pivots, k, a, b);

@@ -18,6 +18,7 @@
  * infinite doubt.  NULL both: all columns have pivots.  Returns 0; 1: x is not found, for a pivot may be round-off, or rows in
  * excess do not agree with the others; 2: a row that is left misses by more than round-off; 3: entries of columns that are left
  * may be more; -2: no memory. */
+enum { SD_DETERMINED, SD_NOT_FOUND, SD_MISSED, SD_DOUBTFUL };
 int sd_graded(int32_t m, int32_t n, double *a, double *b, double *noise, double *x, double *doubt);
 
 #endif
