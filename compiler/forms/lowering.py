@@ -374,8 +374,8 @@ class _Lowering:
             self.assembly.add("dynamics_rate", on.data[0], on.args, effort.nest, rate)
 
     def _prescribes_motion(self, row: Row) -> bool:
-        """Whether a gamma reads displacements alone, one of what has inertia: b = sin(t) says what the acceleration of b
-        is, and so which effort makes it.
+        """Whether a gamma reads displacements alone, one of what has inertia: b = sin(t) says what the acceleration
+        of b is, and so which effort makes it.
         """
         read = {v for term in row.terms for v in variables(term.expression) if v.op == "var"}
         own = {v.data[0] for v in read if v.data[1] == self.model.mirror.coordinate and not v.data[2]}
