@@ -18,7 +18,7 @@ from sysdyn.runtime.integrate.request import LONGEST, Request
 from sysdyn.runtime.model.description import Floats
 from sysdyn.runtime.model.failures import SolverFailure
 from sysdyn.runtime.model.system import System
-from sysdyn.runtime.simulate import counted, formed
+from sysdyn.runtime.simulate import form_system, without_redundant
 from sysdyn.runtime.start.start import ConsistentState
 from sysdyn.runtime.structure.structure import Structure
 
@@ -33,24 +33,24 @@ def arrival(
 
     Raises NoSuchForm, WrongOption, SolverFailure.
     """
-    written, start, facts = counted(written, start, facts, options)
+    written, start, facts = without_redundant(written, start, facts, options)
     if options.t_end <= start.t:
         return written, start
     begin = written.description.p.copy(), written.description.switches.active.copy()  # events write there
-    system, index, _ = formed(written, start, facts, options)
+    system, index, _ = form_system(written, start, facts, options)
     way = Way(choose_method(options), system, index, "")
     controlled = replace(options, rtol=None, atol=None)
     ways = (way,) if options.method != "auto" else alternatives(way, written, start, controlled)
     for k, way in enumerate(ways):
         try:
-            return written, _arrived(way, start, options, begin, last=k + 1 == len(ways))
+            return written, _run_to_end(way, start, options, begin, last=k + 1 == len(ways))
         except SolverFailure as failure:
             if k + 1 == len(ways) or failure.cause in ("max_wall", "memory"):
                 raise
     raise AssertionError
 
 
-def _arrived(
+def _run_to_end(
     way: Way, start: ConsistentState, options: Options, begin: tuple[Floats, NDArray[np.bool_]], *, last: bool
 ) -> ConsistentState:
     """One run without rows, then the point it came to on all rows."""

@@ -80,10 +80,10 @@ class Judgement:
 
     def attributes(self) -> dict[str, str | int]:
         """Root attributes of the trace."""
-        kept = {"conserved": json.dumps(self.kept())} if self.conserved else {}
+        kept = {"conserved": json.dumps(self.conserved_quantities())} if self.conserved else {}
         return {"met": int(self.met), "judged": " ".join(self.judged), **kept}
 
-    def kept(self) -> list[dict[str, Any]]:
+    def conserved_quantities(self) -> list[dict[str, Any]]:
         """What should have kept its value, how far it went from it, and of how much, in `unit`."""
         return [{"what": b.title, "drift": b.value, "of": b.turnover, "unit": b.unit} for b in self.conserved]
 
@@ -118,7 +118,7 @@ class Cancelled:
     moves: float = 0.0
 
 
-def cancelled(
+def cancelling_quantities(
     nominal: Mapping[str, float],
     seen: Mapping[str, float],
     asked: float | None,
@@ -141,7 +141,7 @@ def cancelled(
             yield Cancelled(name, own * error, own, moves)
 
 
-def allowed(options: Options) -> float:
+def allowed_share(options: Options) -> float:
     """The part of what went through a ledger that its balance may be."""
     if own_tolerances(options):
         return max(min(MOST, TIMES * float(np.sqrt(options.rtol if options.rtol is not None else 1e-6))), LEAST)
@@ -149,7 +149,7 @@ def allowed(options: Options) -> float:
     return max(TIMES * max(asked, default=0.0), LEAST)
 
 
-def undefined(found: tuple[str, float] | None) -> tuple[Estimate, ...]:
+def not_met_undefined(found: tuple[str, float] | None) -> tuple[Estimate, ...]:
     """A quantity of the trace that is no number from an instant [s] on: missed whatever was asked of it."""
     return () if found is None else (Estimate(found[0], None, 0.0, found[1], undefined=True),)
 
@@ -176,7 +176,7 @@ def judge(
     if method == "euler":
         return Judgement((), tuple(found), conserved, turned_over(balances))
     judged = ["accuracy"] if accurate else []
-    part = allowed(options)
+    part = allowed_share(options)
     for kind, what in (("energy", "energy"), ("invariant", "invariants")):
         own = [(k, b) for k, b in enumerate(balances) if b.kind == kind]
         judged += [what] if own else []

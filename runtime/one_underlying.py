@@ -27,7 +27,7 @@ def refuse_undetermined(written: System, system: System, start: ConsistentState)
         still = list(dict.fromkeys(name.rstrip("'") for name in missing if name.endswith("'")))[:3]
         remedy = f"inertia on {', '.join(still)}, constraints that hold it, or " if still else ""
         raise NoSuchForm(
-            f"there is no underlying equation: {_listed(missing)} not determined by the balances of efforts, the "
+            f"there is no underlying equation: {_list_names(missing)} not determined by the balances of efforts, the "
             "constraints and the gammas (coordinates without inertia; a balance without it would have to be "
             f"differentiated too): {remedy}{REMEDY}"
         )
@@ -46,11 +46,11 @@ def refuse_sliding(system: System, events: Plan | None, failure: SolverFailure) 
     sliding = [k.name for k in events.kinks if system.description.p[k.branch] == SLIDES]
     if sliding:
         rows = () if failure.row is None else (failure.row,)
-        text = f"from t = {failure.time:.9g} s on {_listed(sliding)} held at zero, where a law jumps: {AT_TIMES}"
+        text = f"from t = {failure.time:.9g} s on {_list_names(sliding)} held at zero, where a law jumps: {AT_TIMES}"
         raise NoSuchForm(text, rows) from failure
 
 
-def _listed(names: Sequence[str]) -> str:
+def _list_names(names: Sequence[str]) -> str:
     """The first names and how many more, with their verb."""
     more = f" and {len(names) - 3} more" if len(names) > 3 else ""
     return ", ".join(names[:3]) + more + (" is" if len(names) == 1 else " are")

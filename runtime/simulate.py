@@ -12,12 +12,12 @@ from typing import Any
 
 from sysdyn.runtime.accuracy.alternatives import alternatives
 from sysdyn.runtime.accuracy.control import Achieved
-from sysdyn.runtime.accuracy.controlled import controlled, unmet
+from sysdyn.runtime.accuracy.controlled import run_controlled, worst_miss
 from sysdyn.runtime.accuracy.options import Options, choose_index, choose_method
 from sysdyn.runtime.accuracy.runs import Runs, Samples
 from sysdyn.runtime.accuracy.way import Way
 from sysdyn.runtime.events.plan import Happened
-from sysdyn.runtime.judgement import UNJUDGED, Cancelled, Judgement, cancelled, judge, undefined
+from sysdyn.runtime.judgement import UNJUDGED, Cancelled, Judgement, cancelling_quantities, judge, not_met_undefined
 from sysdyn.runtime.model.carrier import Carrier
 from sysdyn.runtime.model.description import Description, describe
 from sysdyn.runtime.model.failures import SolverFailure, WrongOption
@@ -25,7 +25,7 @@ from sysdyn.runtime.model.system import System
 from sysdyn.runtime.one_underlying import refuse_contacts, refuse_sliding, refuse_undetermined
 from sysdyn.runtime.start.start import ConsistentState, consistent_start
 from sysdyn.runtime.structure.left_out import following
-from sysdyn.runtime.structure.rates import determined
+from sysdyn.runtime.structure.rates import determined_rates
 from sysdyn.runtime.structure.structure import Structure, index_of, structure
 from sysdyn.runtime.trace.trace import Trace
 from sysdyn.runtime.trace.trace_store import columns_of
@@ -78,7 +78,7 @@ class Outcome:
         return self.final and self.judgement is not None and self.judgement.met
 
 
-def counted(
+def without_redundant(
     written: System, start: ConsistentState, facts: Structure, options: Options
 ) -> tuple[System, ConsistentState, Structure]:
     """The model as written without the redundant constraints that the options leave out."""
@@ -87,13 +87,13 @@ def counted(
     if facts.left_out and options.redundancy != "error":
         alike = options.redundancy == "minimum_norm" and not options.events
         followed = following(written, start, len(facts.left_out)) if alike else None
-        written = followed or written.without(facts.left_out)
+        written = followed or written.without_constraints(facts.left_out)
         start = replace(consistent_start(written, options.t_start, start), moved=start.moved)
         facts = replace(facts, index=index_of(written, start)[0], undetermined=())
     return written, start, facts
 
 
-def formed(
+def form_system(
     written: System, start: ConsistentState, facts: Structure, options: Options
 ) -> tuple[System, int, tuple[str, ...]]:
     """The system in the index form of the options, its index, warnings.  Raises NoSuchForm, ValueError."""
@@ -128,24 +128,24 @@ def simulate(
     """
     description = manifest if isinstance(manifest, Description) else describe(manifest, binding or {})
     method = choose_method(options)
-    written = System.of(description, carrier, "3")
+    written = System.from_description(description, carrier, "3")
     start = start or consistent_start(written, options.t_start)
     facts = facts or structure(written, start)
-    written, start, facts = counted(written, start, facts, options)
-    system, index, warnings = formed(written, start, facts, options)
+    written, start, facts = without_redundant(written, start, facts, options)
+    system, index, warnings = form_system(written, start, facts, options)
     if system.form.name == "0":
         refuse_contacts(options.events)
     way = Way(method, system, index, form_name(system, facts))
     ways = (way,) if options.method != "auto" else alternatives(way, written, start, options)
     runs = Runs(start, options, ways[0])
-    with runs.keeping.claimed():
+    with runs.keeping.claim():
         return _runs(runs, ways[1:], written, facts, warnings)
 
 
 def _runs(runs: Runs, others: tuple[Way, ...], written: System, facts: Structure, warnings: tuple[str, ...]) -> Outcome:
     """The runs of one simulation, whose trace is claimed."""
     options, start = runs.options, runs.start
-    runs.derive(determined(written, start))
+    runs.derive(determined_rates(written, start))
 
     def outcome(
         final: bool, reached: float, achieved: Achieved | None, failure: SolverFailure | None, **more: Any
@@ -162,7 +162,7 @@ def _runs(runs: Runs, others: tuple[Way, ...], written: System, facts: Structure
             runs.way.name,
             start,
             facts,
-            runs.collected(),
+            runs.collect_samples(),
             warnings,
             failure,
             reason=runs.way.reason,
@@ -172,7 +172,7 @@ def _runs(runs: Runs, others: tuple[Way, ...], written: System, facts: Structure
 
     achieved: Achieved | None = None
     try:
-        achieved = controlled(runs, options, others)
+        achieved = run_controlled(runs, options, others)
     except SolverFailure as failure:
         close(runs, None, None)
         if runs.system.form.name == "0":
@@ -184,7 +184,7 @@ def _runs(runs: Runs, others: tuple[Way, ...], written: System, facts: Structure
         close(runs, None, None)
         raise
     assert runs.done is not None
-    misses = unmet(runs, options, achieved) or undefined(runs.done[2].undefined())
+    misses = worst_miss(runs, options, achieved) or not_met_undefined(runs.done[2].first_undefined())
     judgement = judge(options, runs.method, runs.done[0].balances, achieved is not None, misses, runs.open_balances)
     close(runs, achieved, judgement)
     finished, _, writer = runs.done
@@ -195,7 +195,7 @@ def _runs(runs: Runs, others: tuple[Way, ...], written: System, facts: Structure
     estimate = achieved.error_estimate if achieved is not None else None
     ranges = {name: moves for name, moves in writer.ranges().items() if name not in options.to_range}
     terms = runs.quantities.terms(finished.largest)
-    lost = tuple(cancelled(terms, writer.seen(), options.accuracy, estimate, ranges))
+    lost = tuple(cancelling_quantities(terms, writer.seen(), options.accuracy, estimate, ranges))
     below = achieved is not None and achieved.below_round_off
     told = {"judgement": judgement, "below_round_off": below, "cancelled": lost, "events": finished.events}
     told |= {"steps": finished.statistics.steps, "extrema": _extrema(runs)}

@@ -26,11 +26,11 @@ from sysdyn.dsl.model.network import Network
 from sysdyn.dsl.model.units import si_text
 from sysdyn.dsl.names.symbols import nearest
 from sysdyn.dsl.tree import syntax
-from sysdyn.runtime.linear.modes import Mode, Transfer, modes, stored, transfer, wide_transfer
+from sysdyn.runtime.linear.modes import Mode, Transfer, modes, store_shares, transfer, wide_transfer
 from sysdyn.runtime.linear.pencil import Descriptor
 from sysdyn.runtime.linear.states import constant, moving, quadratures
 from sysdyn.runtime.linear.tangent import Given, NoLinearisation, Outputs, Reduced, Wide, integral, rows_at
-from sysdyn.runtime.linear.witnessed import witnessed
+from sysdyn.runtime.linear.witnessed import reduce_witnessed
 from sysdyn.runtime.model.forms import FORMS, Form
 from sysdyn.runtime.model.system import System
 from sysdyn.values import dataclass
@@ -142,7 +142,7 @@ def linearise(found: Found, inputs: Sequence[Input], index: str = "3", watched: 
     still = fixed or not moving(system, state)  # the pencil of the form as written is right too
     pencil = _descriptor(system, found, slopes, out, labels) if still else None
     # on the constraint manifold, with the pencil as a witness
-    small = witnessed(Given(rows, system, state, by_input, out, labels, loose_of(found)), pencil, fixed=fixed)
+    small = reduce_witnessed(Given(rows, system, state, by_input, out, labels, loose_of(found)), pencil, fixed=fixed)
     own = modes(small.a, small.decomposed)
     stores, energies = _energies(found, small, own, names)
     # outputs that were added for energies alone are not shown
@@ -202,7 +202,7 @@ def _energies(found: Found, small: Reduced, own: Sequence[Mode], names: Sequence
     if not known or not own:
         return (), np.zeros((len(own), 0))
     content, conjugate = (small.c[[at[s[k]] for s in known]] for k in (1, 2))
-    return tuple(s[0] for s in known), stored(own, content, conjugate)
+    return tuple(s[0] for s in known), store_shares(own, content, conjugate)
 
 
 def _transfer(small: Reduced, i: int, j: int) -> Transfer:

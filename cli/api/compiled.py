@@ -94,7 +94,7 @@ class Module:
             made = System(prepared.structure, arrays, prepared.carrier, system.form.name)
             if len(self._systems) > KEPT:
                 self._systems.pop(next(each for each in self._systems if each))
-            self._systems[key] = made.without(system.left_out) if system.left_out else made
+            self._systems[key] = made.without_constraints(system.left_out) if system.left_out else made
         return self._systems[key]
 
     def _prepare_point(

@@ -58,7 +58,7 @@ def _changes(formed: Formed, places: dict[str, slice], following: Following, nam
         arrays["p"][places[name]] = 0.0
     other = type(written)(prepared.structure, arrays, prepared.carrier)
     if written.left_out:
-        other = other.without(written.left_out)
+        other = other.without_constraints(written.left_out)
     jy, jyd = other.jacobian(formed.state.t, *formed.state.for_form(other))
     # 1/p: no number at zero
     if not (np.isfinite(jy).all() and np.isfinite(jyd).all()):

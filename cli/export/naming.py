@@ -54,7 +54,7 @@ def _entries(name: str, family: Family) -> list[tuple[dict[str, Any], int]]:
     """What says a family, and its size; one by one where the author wrote its elements so."""
     if not family.elements:
         return [(family_entry(name, family.shape), family.size)]
-    return [({"name": family.named(k, name)}, 1) for k in range(family.size)]
+    return [({"name": family.name_of(k, name)}, 1) for k in range(family.size)]
 
 
 def _nu_unit(formed: Formed, kappa: int) -> str:
@@ -114,7 +114,7 @@ def _labels(name: str, family: Family | RowFamily, kind: str, place: Place | Non
     if not family.elements:
         said = family_entry(name, family.shape)
         return [{"label": said.pop("name"), **said, "kind": kind, **where(place)}]
-    each = (description.named(name, family.shape, family.elements, k) for k in range(family.size))
+    each = (description.name_of(name, family.shape, family.elements, k) for k in range(family.size))
     return [{"label": label, "kind": kind, "file": file, "line": line} for label, file, line in each]
 
 

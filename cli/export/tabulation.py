@@ -23,7 +23,7 @@ from sysdyn.runtime.integrate.underlying import Accelerations, Selection, Underl
 from sysdyn.runtime.model.description import Floats, Ints
 from sysdyn.runtime.model.failures import NoSuchForm
 from sysdyn.runtime.model.system import System
-from sysdyn.runtime.simulate import counted, formed
+from sysdyn.runtime.simulate import form_system, without_redundant
 from sysdyn.runtime.start.start import ConsistentState
 from sysdyn.runtime.start.starter import Starter
 from sysdyn.runtime.structure.structure import Structure
@@ -63,8 +63,8 @@ def choose(prepared: Prepared, started: Started, index: str | None) -> Formed:
     policy = (scene.redundancy if scene else None) or "error"
     t0 = started.state.t
     options = Options(output="", t_start=t0, t_end=t0 + 1.0, index=wanted, redundancy=policy)
-    written, state, facts = counted(started.system, started.state, started.facts, options)
-    system, _, warnings = formed(written, state, facts, options)
+    written, state, facts = without_redundant(started.system, started.state, started.facts, options)
+    system, _, warnings = form_system(written, state, facts, options)
     if system.form.name == "0":
         _refuse_massless(system, state)
     return Formed(prepared, written, system, state, facts, warnings)

@@ -21,7 +21,7 @@ from sysdyn.cli.run.many.crew import Lost, each
 from sysdyn.cli.run.request.run_request import RunRequest
 from sysdyn.runtime.comparison.arrays import Arrays
 from sysdyn.runtime.comparison.curve import Curve, Flags, Floats, bernstein, cells_at
-from sysdyn.runtime.comparison.thinning import estimated_rates, rounded, thinned
+from sysdyn.runtime.comparison.thinning import estimated_rates, round_to_step, thin_rows
 from sysdyn.runtime.comparison.verdict import SHARE, Tolerance, Verdict
 from sysdyn.values import dataclass
 
@@ -229,13 +229,13 @@ def _thin(base: GoldenRun, rtol: float, atol: float) -> Arrays:
         rates[name] = estimated_rates(trace.time, trace.values[name], limit / 2) if known is None else known
     full = [Curve(trace.time, trace.values[n], trace.rates.get(n)) for n in names]
     wanted = [Curve(trace.time, trace.values[n], rates[n]) for n in names]
-    rows = thinned(full, limits, wanted)
+    rows = thin_rows(full, limits, wanted)
     steps = dict(zip(names, limits * ROUNDING, strict=True))
     longest = float(np.max(np.diff(trace.time[rows]), initial=0.0)) or 1.0
     return Arrays(
         trace.time[rows],
-        {n: rounded(trace.values[n][rows], steps[n]) for n in names},
-        {n: rounded(r[rows], steps[n] / longest) for n, r in rates.items() if np.isfinite(r[rows]).any()},
+        {n: round_to_step(trace.values[n][rows], steps[n]) for n in names},
+        {n: round_to_step(r[rows], steps[n] / longest) for n, r in rates.items() if np.isfinite(r[rows]).any()},
         list(trace.quantities.values()),
         trace.events,
         trace.time_unit,

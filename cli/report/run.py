@@ -77,7 +77,7 @@ def start(study: ReportStudy) -> str:
         for k in range(family.size):
             if family.kind not in BESIDE and position < state.y.size and len(rows) <= SHOWN:
                 rate = f"{state.yd[position]:.6g}" if np.isfinite(state.yd[position]) else "–"
-                rows.append([family.named(k), f"{state.y[position]:.6g}", rate])
+                rows.append([family.name_of(k), f"{state.y[position]:.6g}", rate])
             position += 1
     called = names_of(study.network, (name for name, *_ in rows))
     rows = [[escape(name), *numbers] for name, (_, *numbers) in zip(called, rows, strict=True)]

@@ -55,7 +55,7 @@ class _Planner:
     def __init__(self, prepared: Prepared, system: System) -> None:
         self.prepared, self.system = prepared, system
         description = system.description
-        names = [r.named(k) for r in _rows(system) for k in range(r.size)]
+        names = [r.name_of(k) for r in _rows(system) for k in range(r.size)]
         self.row = {name: k for k, name in enumerate(names)}
         self.unknown = {
             (f.owner, f.kind): (int(system.form.at[k]), f.shape)

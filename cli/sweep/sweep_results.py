@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 from sysdyn.runtime.model.failures import TraceError
-from sysdyn.runtime.trace.opening import opened
+from sysdyn.runtime.trace.opening import open_regular
 
 
 class Sweep(Mapping[str, NDArray[Any]]):
@@ -27,7 +27,7 @@ class Sweep(Mapping[str, NDArray[Any]]):
         """Of a file that `sysdyn sweep` wrote.  TraceError where it is none, OSError where it cannot be read, or where
         it names other files.
         """
-        with opened(file) as found:
+        with open_regular(file) as found:
             if "run" not in found or "exit" not in found:
                 raise TraceError(f"{file} holds no runs of a sweep")
             arrays = {name: _read(found[name]) for name in found}

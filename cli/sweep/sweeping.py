@@ -29,7 +29,7 @@ from sysdyn.dsl.model import expression as ex
 from sysdyn.dsl.model.units import si_text
 from sysdyn.dsl.rules.text_conditions import REFUSED
 from sysdyn.dsl.text.diagnostics import ModelError, Report
-from sysdyn.runtime.trace.claim import claimed
+from sysdyn.runtime.trace.claim import claim_trace
 from sysdyn.runtime.trace.opening import destination
 from sysdyn.values import dataclass
 
@@ -131,7 +131,7 @@ def sweep(
     units, attributes = _units(runner, cases[0]), _attributes(target, study)
     place = destination(output)
     # one sweep at a time writes a file
-    with claimed(place), SweepJournal(place, digest) as journal:
+    with claim_trace(place), SweepJournal(place, digest) as journal:
         resumed = len(journal.done)
         tasks = ((k, case) for k, case in enumerate(cases) if k not in journal.done)
         left = len(cases) - resumed

@@ -55,11 +55,11 @@ class Accounts:
         options = self.options
         span = options.t_end - options.t_start
         fraction = (t - options.t_start) / span if span > 0.0 else 1.0
-        left = self._left(fraction, another=another)
+        left = self._seconds_left(fraction, another=another)
         if options.progress is not None:
             options.progress(fraction, left)
 
-    def _left(self, fraction: float, *, another: bool) -> float | None:
+    def _seconds_left(self, fraction: float, *, another: bool) -> float | None:
         """Seconds to the end of the runs that are foreseen; None before a hundredth of the first."""
         if not FORETOLD <= fraction < 1.0:
             return None if fraction < 1.0 else 0.0

@@ -49,7 +49,7 @@ def alternatives(way: Way, written: System, start: ConsistentState, options: Opt
         return replace(way, reason=f"index {way.name} was asked for"), other
     if options.events and not options.events.bends:
         steep = options.events.of_laws and way.system.form.scales
-        first = _reduced(way, written, start, options) if steep else ()
+        first = _rosenbrock_at_index_1(way, written, start, options) if steep else ()
         return _because("events", (*first, way, other))
     if way.system.form.scales:
         return _because("steep laws", _of_steep_laws(way, other, written, start, options))
@@ -77,11 +77,11 @@ def _of_steep_laws(way: Way, other: Way, written: System, start: ConsistentState
     0.3 to 1.06 on diode grids of up to 30 x 30, 0.6 to 1.3 along LC lines with diodes of up to 300, 0.3 to 1.1 in tube.
     """
     iterating = (way, other) if way.method == "bdf" else (other, way)
-    ways = _without_newton(way, options) + iterating + _differentiated(way, written, options)
-    return _reduced(way, written, start, options) + ways
+    ways = _without_newton(way, options) + iterating + _radau_at_index_1(way, written, options)
+    return _rosenbrock_at_index_1(way, written, start, options) + ways
 
 
-def _reduced(way: Way, written: System, start: ConsistentState, options: Options) -> tuple[Way, ...]:
+def _rosenbrock_at_index_1(way: Way, written: System, start: ConsistentState, options: Options) -> tuple[Way, ...]:
     """Rosenbrock at index 1 where steep laws of index 2 do not turn."""
     if way.index != 2 or not FEW < way.system.unknowns <= SMALL:
         return ()
@@ -100,7 +100,7 @@ def _turns(system: System, start: ConsistentState, options: Options) -> bool:
         return not bool((slopes[sizes != 0.0] <= GROWS * sizes[sizes != 0.0]).all())
 
 
-def _differentiated(way: Way, written: System, options: Options) -> tuple[Way, ...]:
+def _radau_at_index_1(way: Way, written: System, options: Options) -> tuple[Way, ...]:
     """Radau at index 1, where constraints that diodes make and leave hold by their derivatives: of 48 runs of
     rectifiers at random that neither method met at index 2 it met 12.
     """

@@ -84,7 +84,7 @@ class Thinned:
         return found[place] if np.array_equal(found[place, 0], instants) else found[:0]
 
 
-def known(times: Floats, options: Options, quantities: int) -> Floats | None:
+def known_instants(times: Floats, options: Options, quantities: int) -> Floats | None:
     """Instants of comparison [s] where those of the trace are known before a run; None where they are its steps."""
     if options.every is None:
         return None
@@ -121,7 +121,7 @@ def late_by(instants: Floats, one: Floats, two: Floats, span: float) -> Floats:
     the other.  What the jumps do is compared behind them.  Where both have it at the same instant, as sampled actions
     are, both values there are those before it.
     """
-    one, two = _grouped(one, span), _grouped(two, span)
+    one, two = _group_bounds(one, span), _group_bounds(two, span)
     if not (one.size and two.size):
         return np.zeros(instants.size)
     own = _nearest(one[:, 0], two[:, 0])
@@ -135,7 +135,7 @@ def late_by(instants: Floats, one: Floats, two: Floats, span: float) -> Floats:
     return np.where(within, np.append(0.0, high - low)[place], 0.0)
 
 
-def _grouped(events: Floats, span: float) -> Floats:
+def _group_bounds(events: Floats, span: float) -> Floats:
     """First and last [groups, 2] of what a run has at one event: a condition that stands at its edge may turn again at
     once in one run, and not in another.
     """
@@ -152,7 +152,7 @@ def _nearest(times: Floats, wanted: Floats) -> NDArray[np.intp]:
     return np.where(np.abs(times[left] - wanted) <= np.abs(times[right] - wanted), left, right)
 
 
-def joined(instants: Floats, kinds: Ints, compared: Floats) -> tuple[Floats, Ints]:
+def join_instants(instants: Floats, kinds: Ints, compared: Floats) -> tuple[Floats, Ints]:
     """Instants with their kinds, those of comparison among them."""
     every = distinct(np.concatenate([instants, compared]))
     found = np.zeros(every.size, dtype=np.int32)
@@ -170,9 +170,9 @@ class _Joined:
     draft: tuple[Floats, Ints]
 
     @classmethod
-    def of(cls, times: Floats, kinds: Ints, compared: Floats) -> _Joined:
+    def select_instants(cls, times: Floats, kinds: Ints, compared: Floats) -> _Joined:
         """Of instants and kinds of rows."""
-        every = joined(times, kinds, compared)
+        every = join_instants(times, kinds, compared)
         use = (every[1] & COMPARED) > 0
         return cls(compared, every, (every[0][use], every[1][use]))
 
@@ -189,8 +189,8 @@ class Instants:
         before = kept.get("instants")
         if before is None or before[0] != asked:
             times, kinds = instants(options)
-            compared = known(times, options, quantities)
-            both = None if compared is None else _Joined.of(times, kinds, compared)
+            compared = known_instants(times, options, quantities)
+            both = None if compared is None else _Joined.select_instants(times, kinds, compared)
             before = asked, (times, kinds, compared, both)
             if times.size <= KEPT:
                 kept["instants"] = before
@@ -215,5 +215,5 @@ class Instants:
         if not compared or self.common is None:
             return self.times, self.kinds
         if self._joined is None or self._joined.compared is not self.common:
-            self._joined = _Joined.of(self.times, self.kinds, self.common)
+            self._joined = _Joined.select_instants(self.times, self.kinds, self.common)
         return self._joined.draft if draft else self._joined.every

@@ -86,7 +86,7 @@ class Compared:
                 jump = np.abs(values[same + 1] - values[same])
             self._jump = np.fmax(self._jump, jump.max(axis=0))
 
-    def sampled(self, tolerance: float, finished: Finished, quantities: Quantities) -> Sampled:
+    def sample_run(self, tolerance: float, finished: Finished, quantities: Quantities) -> Sampled:
         """Of the run that has ended; the next is compared at its instants."""
         width = lib.ROW_HEAD + 2 * self._observed
         rows = np.concatenate(self._rows) if self._rows else np.zeros((0, width))
@@ -98,13 +98,13 @@ class Compared:
             there = _values(own, finished, quantities), self._late(own, quantities, steps=True)
         self._at = instants if instants is not None else self.instants.common
         values = there[0] if there is not None and instants is None else _values(rows, finished, quantities)
-        noise = pairs.ROUND_OFF * quantities.beside(finished.largest, finished.magnitude)
+        noise = pairs.ROUND_OFF * quantities.largest_of_unit(finished.largest, finished.magnitude)
         noise = np.append(noise, np.zeros(len(quantities.meters)))
         late = self._late(rows, quantities) if instants is not None else 0.0
-        asked, own = quantities.asked(self.options), quantities.terms_of_run(finished)
+        asked, own = quantities.accuracy_asked(self.options), quantities.terms_of_run(finished)
         sizes, steps = quantities.of_run(finished), finished.statistics.steps
         if ((own > 0.0) & (noise > _share(asked, own))).any():  # else noise excuses less than is asked
-            nominal, excused = self._excused(finished, quantities)
+            nominal, excused = self._nominals_and_excuse(finished, quantities)
             sizes, noise = np.minimum(sizes, nominal), np.minimum(noise, excused)
         if quantities.to_range.size:
             sizes, noise = self._by_range(sizes, noise, quantities)
@@ -129,7 +129,7 @@ class Compared:
         span = np.where(np.isfinite(span), span, sizes[which])
         self.moves = span > pairs.ROUND_OFF * sizes[which]
         self._range = sizes[which] = np.maximum(span, pairs.ROUND_OFF * sizes[which])
-        noise[which] = np.minimum(noise[which], quantities.asked(self.options)[which] * self._range)
+        noise[which] = np.minimum(noise[which], quantities.accuracy_asked(self.options)[which] * self._range)
         return sizes, noise
 
     def ranges(self, values: Floats) -> Floats:
@@ -212,9 +212,9 @@ class Compared:
         """
         found = self.left_open(finished, quantities.system).quantities[quantities.places]
         found = np.append(found, np.zeros(len(quantities.meters)))
-        return np.minimum(found, self._excused(finished, quantities)[1])
+        return np.minimum(found, self._nominals_and_excuse(finished, quantities)[1])
 
-    def _excused(self, finished: Finished, quantities: Quantities) -> tuple[Floats, Floats]:
+    def _nominals_and_excuse(self, finished: Finished, quantities: Quantities) -> tuple[Floats, Floats]:
         """Nominal value of each compared quantity, and how much of it may be excused."""
         if self._sized is None or self._sized[0] is not finished:
             self._sized = finished, self._nominal(finished, quantities)
@@ -222,7 +222,7 @@ class Compared:
         if quantities.to_range.size:
             nominal = nominal.copy()
             nominal[quantities.to_range] = self._range
-        return nominal, _share(quantities.asked(self.options), nominal)
+        return nominal, _share(quantities.accuracy_asked(self.options), nominal)
 
     def _nominal(self, finished: Finished, quantities: Quantities) -> Floats:
         """Nominal value of each compared quantity: its largest value or term, or what the rows that determine the
@@ -250,7 +250,7 @@ class Compared:
         assert self._at is not None
         size = (one if one.tolerance < two.tolerance else two).largest
         with np.errstate(all="ignore"):
-            ratio = pairs.apart(one, two) / (size * target)
+            ratio = pairs.distance_of_runs(one, two) / (size * target)
         ratio = np.where(np.isfinite(ratio), ratio, np.where(np.isfinite(target), np.inf, 0.0))
         same = (one.own[0] == two.values) & np.isfinite(two.values)
         ratio = np.where(same | pairs.zero(one, two, target), 0.0, ratio)

@@ -17,7 +17,7 @@ from collections.abc import Callable
 import numpy as np
 from sysdyn.runtime.accuracy.estimate import DEAR, LENGTHY, STRETCH, Estimate, is_held
 from sysdyn.runtime.accuracy.laws import Law
-from sysdyn.runtime.accuracy.pairs import ROUND_OFF, Sampled, difference, parted
+from sysdyn.runtime.accuracy.pairs import ROUND_OFF, Sampled, difference, have_diverged
 from sysdyn.runtime.integrate.request import LONGEST
 from sysdyn.runtime.model.description import Floats
 from sysdyn.runtime.model.failures import SolverFailure
@@ -65,14 +65,14 @@ Run = Callable[[float, float], Sampled]
 """Integrates with a tolerance and a longest step as part of the span."""
 
 
-def _achieved(estimate: float, met: bool, runs: int, tolerance: float, *, lost: bool = False) -> Achieved:
+def _achievement(estimate: float, met: bool, runs: int, tolerance: float, *, lost: bool = False) -> Achieved:
     """A finite estimate, or none at all."""
     if not np.isfinite(estimate):
         return Achieved(None, False, runs, tolerance, lost)
     return Achieved(estimate, met, runs, tolerance, lost)
 
 
-def _shifted(run: Run, last: Sampled, target: Floats, number: int) -> Achieved:
+def _verdict_on_like_steps(run: Run, last: Sampled, target: Floats, number: int) -> Achieved:
     """The verdict on two runs that took the same steps: what a run with other steps differs by."""
     try:
         # at most half the mean step: so the instants of the steps are others
@@ -80,10 +80,10 @@ def _shifted(run: Run, last: Sampled, target: Floats, number: int) -> Achieved:
     except SolverFailure:
         return Achieved(None, False, number + 1, last.tolerance)
     apart, over = difference(last, now, target)
-    return _achieved(apart, over <= 1.0, number + 1, last.tolerance)
+    return _achievement(apart, over <= 1.0, number + 1, last.tolerance)
 
 
-def _limited(failure: SolverFailure) -> bool:
+def _is_limited(failure: SolverFailure) -> bool:
     """It ended because the caller wanted it to, or no time is left."""
     return failure.late or failure.cause in ("max_steps", "max_wall")
 
@@ -96,7 +96,7 @@ def _draft(run: Run, tolerance: float, law: Law) -> Sampled:
             return run(min(max(RETRIED[tried] * tolerance, law.finest) / law.ratio, law.loosest), DRAFT * LONGEST)
         except SolverFailure as failure:
             tried += 1
-            if tried == len(RETRIED) or _limited(failure) or failure.cause == "stiff":
+            if tried == len(RETRIED) or _is_limited(failure) or failure.cause == "stiff":
                 raise
             if failure.cause == "strained" or tried == len(RETRIED) - 1:
                 tolerance = min(tolerance, TAME * law.ratio / RETRIED[tried])
@@ -137,13 +137,13 @@ def control(
             break
         apart = estimate.compare(last, now, shorter)
         if now.steps == last.steps and apart < ROUND_OFF:
-            return _shifted(run, now, target, number)
-        away = parted(last, now, target)
+            return _verdict_on_like_steps(run, now, target, number)
+        away = have_diverged(last, now, target)
         if estimate.met and not ((doubted or estimate.stalled) and estimate.alone) and not away:
-            return _achieved(estimate.apart, True, number, now.tolerance)
+            return _achievement(estimate.apart, True, number, now.tolerance)
         dear = estimate.lost or estimate.next_tolerance(now.tolerance) <= DEAR
         if law.brief and dear and now.steps < LENGTHY:
-            return _achieved(estimate.apart, False, number, now.tolerance, lost=estimate.lost)
+            return _achievement(estimate.apart, False, number, now.tolerance, lost=estimate.lost)
         before, still = still, is_held(now, longest)
         held, finest = before and still, now.tolerance <= 1.01 * law.finest
         if finest and not held:
@@ -153,8 +153,8 @@ def control(
         last, longest = now, longest * (shorter or 1.0 / STRETCH)
         tolerance = min(estimate.next_tolerance(now.tolerance), TAME if away else 1.0)
     if estimate.met and not away:  # doubted, and no finer run can tell: one with other steps can
-        return _shifted(run, last, target, number)
-    return _achieved(estimate.apart, False, number, last.tolerance)
+        return _verdict_on_like_steps(run, last, target, number)
+    return _achievement(estimate.apart, False, number, last.tolerance)
 
 
 def _finer(run: Run, last: Sampled, tolerance: float, longest: float, law: Law, *, compared: bool) -> Sampled | None:
@@ -169,7 +169,7 @@ def _finer(run: Run, last: Sampled, tolerance: float, longest: float, law: Law, 
             return run(tolerance, longest)
         except SolverFailure as failure:
             tried += 1
-            if _limited(failure) or (not compared and tried == len(RETRIED)):
+            if _is_limited(failure) or (not compared and tried == len(RETRIED)):
                 raise
             by_chance = tried == 1 and failure.cause in CHANCES
         if not compared:  # there is nothing to hand back yet: as coarse as will do, else a little finer

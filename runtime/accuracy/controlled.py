@@ -11,9 +11,9 @@ from dataclasses import replace
 import numpy as np
 from sysdyn.runtime.accuracy.control import Achieved, control
 from sysdyn.runtime.accuracy.options import Options, own_tolerances
-from sysdyn.runtime.accuracy.round_off import blurred
+from sysdyn.runtime.accuracy.round_off import worst_blur
 from sysdyn.runtime.accuracy.runs import Runs
-from sysdyn.runtime.accuracy.second_opinion import confirmed
+from sysdyn.runtime.accuracy.second_opinion import confirm
 from sysdyn.runtime.accuracy.way import BRIEF, BRIEF_STEEP, LONG, LONG_STEEP, Way
 from sysdyn.runtime.judgement import EPS, Estimate, judge
 from sysdyn.runtime.model.failures import SolverFailure, WrongOption
@@ -27,7 +27,7 @@ PATIENCE = {"bdf": (LONG, LONG_STEEP), "rosenbrock": (BRIEF, BRIEF_STEEP)}
 """Steps after which the next method is tried, of laws that are not steep and of those that are."""
 
 
-def _left(runs: Runs, failure: SolverFailure) -> str:
+def _reason_to_leave(runs: Runs, failure: SolverFailure) -> str:
     """Why a method was left."""
     method = runs.method
     if failure.cause == "stiff":
@@ -37,7 +37,7 @@ def _left(runs: Runs, failure: SolverFailure) -> str:
     return f"{method} stopped at {failure.time:.6g} s"
 
 
-def controlled(runs: Runs, options: Options, others: tuple[Way, ...]) -> Achieved | None:
+def run_controlled(runs: Runs, options: Options, others: tuple[Way, ...]) -> Achieved | None:
     """Runs with accuracy control; None of one run with the solver's own tolerances."""
     if runs.method == "euler":
         if options.euler_step is None:
@@ -47,24 +47,26 @@ def controlled(runs: Runs, options: Options, others: tuple[Way, ...]) -> Achieve
     if own_tolerances(options):
         runs.run(options.rtol if options.rtol is not None else 1e-6, options.atol)
         return None
-    achieved = _chosen(runs, options, others) if options.method == "auto" else _achieved(runs, options)
-    achieved = _balanced(runs, options, achieved)
+    achieved = _chosen(runs, options, others) if options.method == "auto" else _run_one_method(runs, options)
+    achieved = _balance_ledgers(runs, options, achieved)
     if achieved.error_estimate is not None:  # two runs may have the same numbers, which are doubles all the same
         achieved = replace(achieved, error_estimate=max(achieved.error_estimate, EPS))
-    return confirmed(runs, achieved, runs.quantities.asked(options)) if options.accuracy_check else achieved
+    return confirm(runs, achieved, runs.quantities.accuracy_asked(options)) if options.accuracy_check else achieved
 
 
-def unmet(runs: Runs, options: Options, achieved: Achieved | None) -> tuple[Estimate, ...]:
+def worst_miss(runs: Runs, options: Options, achieved: Achieved | None) -> tuple[Estimate, ...]:
     """The quantity that misses most what was asked, by the runs or by what round-off leaves open of it."""
     if achieved is None:
         return ()
     if achieved.met:
-        return blurred(runs, options.t_end, runs.quantities.asked(options))
-    name, asked, time, undefined = runs.compared.worst(runs.quantities.compared, runs.quantities.asked(options))
+        return worst_blur(runs, options.t_end, runs.quantities.accuracy_asked(options))
+    name, asked, time, undefined = runs.compared.worst(
+        runs.quantities.compared, runs.quantities.accuracy_asked(options)
+    )
     return (Estimate(name, achieved.error_estimate, asked, time, undefined),)
 
 
-def _achieved(
+def _run_one_method(
     runs: Runs,
     options: Options,
     *,
@@ -73,30 +75,30 @@ def _achieved(
     tame: bool = False,
 ) -> Achieved:
     """Runs by one method; last: no other takes over, so that it goes on where it would be left to the next."""
-    target, first = runs.quantities.asked(options), options.first
+    target, first = runs.quantities.accuracy_asked(options), options.first
     law = replace(runs.way.law, brief=False) if last else runs.way.law
-    return control(runs.sampled, target, law, doubted=doubted, tame=tame, first=first)
+    return control(runs.run_sampled, target, law, doubted=doubted, tame=tame, first=first)
 
 
-def _unbalanced(runs: Runs, options: Options) -> float:
+def _ledger_excess(runs: Runs, options: Options) -> float:
     """How many times its limit the worst ledger of the last run is off."""
     assert runs.done is not None
     found = judge(options, runs.method, runs.done[0].balances, False, (), runs.open_balances).not_met
     return max((f.value / f.limit if f.value is not None and f.limit > 0.0 else np.inf for f in found), default=0.0)
 
 
-def _balanced(runs: Runs, options: Options, achieved: Achieved) -> Achieved:
+def _balance_ledgers(runs: Runs, options: Options, achieved: Achieved) -> Achieved:
     """A ledger is a sum over the steps: where it alone is off, they are shortened while that helps."""
     runs.patience = runs.patience_with_draft = None  # no method follows
-    off = _unbalanced(runs, options) if achieved.met else 0.0
+    off = _ledger_excess(runs, options) if achieved.met else 0.0
     for _ in range(REFINED):
         if off <= 1.0:
             break
         try:
-            runs.sampled(achieved.tolerance, REFINE / max(runs.accounts.last.steps, 1))
+            runs.run_sampled(achieved.tolerance, REFINE / max(runs.accounts.last.steps, 1))
         except SolverFailure:  # the run before stands, with what it misses
             break
-        before, off = off, _unbalanced(runs, options)
+        before, off = off, _ledger_excess(runs, options)
         achieved = replace(achieved, runs=achieved.runs + 1)
         if off > HELPS * before:
             break
@@ -107,16 +109,16 @@ def _short(runs: Runs, options: Options, achieved: Achieved) -> str | None:
     """What the method did not reach; None where it met everything."""
     if not achieved.met:
         return f"{runs.method} does not reach the accuracy"
-    return None if _unbalanced(runs, options) <= 1.0 else f"the energy of {runs.method} does not balance"
+    return None if _ledger_excess(runs, options) <= 1.0 else f"the energy of {runs.method} does not balance"
 
 
-def _bounded(failure: SolverFailure, runs: Runs) -> bool:
+def _is_bounded(failure: SolverFailure, runs: Runs) -> bool:
     """The caller's own bound ended it, or the text itself ends there: another method would meet the same."""
     limited = failure.cause == "max_steps" and runs.most_steps == runs.options.max_steps
     return limited or failure.late or failure.cause in ("max_wall", "memory", "zeno")
 
 
-def _told(before: SolverFailure | None, last: SolverFailure) -> SolverFailure:
+def _farther_failure(before: SolverFailure | None, last: SolverFailure) -> SolverFailure:
     """Of two methods that stopped the one that got further; where they got equally far, the first."""
     return before if before is not None and last.time <= NO_FURTHER * before.time else last
 
@@ -140,15 +142,15 @@ def _chosen(runs: Runs, options: Options, others: tuple[Way, ...]) -> Achieved:
         runs.patience = PATIENCE.get(runs.method, (None, None))[steep] if others else None
         runs.patience_with_draft = explicit[1] if explicit is not None and others else None
         try:
-            achieved = _achieved(runs, options, last=not others, doubted=doubted, tame=tame)
+            achieved = _run_one_method(runs, options, last=not others, doubted=doubted, tame=tame)
         except SolverFailure as failure:
-            if not others or _bounded(failure, runs):
+            if not others or _is_bounded(failure, runs):
                 if missed is None:
-                    raise _told(stopped, failure) from None
+                    raise _farther_failure(stopped, failure) from None
                 runs.take(stands)
                 return missed
             doubted = failure.cause not in ("max_steps", "stiff") and not runs.way.law.brief
-            why = _left(runs, failure)
+            why = _reason_to_leave(runs, failure)
             smooth = failure.smooth and failure.cause == "max_steps"
             stopped = failure if doubted else stopped
             if explicit is not None and failure.cause == "max_steps":

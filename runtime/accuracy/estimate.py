@@ -181,7 +181,7 @@ class Estimate:
         self._before = (over, step) if shorter is None and not lost else None  # what is lost has no power
         least = self.law.least * fine.tolerance
         shrink *= luck
-        told = self._told(step, coarse, fine) if shorter is None and not slow else SURE
+        told = self._error_ratio(step, coarse, fine) if shorter is None and not slow else SURE
         told = max(shrink, min(told, MET / over)) if over > 0.0 else shrink
         self.apart, self.over = max(apart * told, least), max(over * shrink, least / float(np.min(self.target)))
         self.apart, self.over = max(self.apart, left), max(self.over, left_over)
@@ -195,7 +195,7 @@ class Estimate:
             self.apart *= doubt
         return apart
 
-    def _told(self, step: float, coarse: Sampled, fine: Sampled) -> float:
+    def _error_ratio(self, step: float, coarse: Sampled, fine: Sampled) -> float:
         """Error of the finer run over its difference from the coarser one, at most; step: decades of tolerance."""
         law = self.law
         power = min(law.sure, AT_EVENTS) if fine.jumps else law.sure

@@ -22,7 +22,7 @@ from sysdyn.runtime.model.patterns import Pattern
 from sysdyn.runtime.model.scales import alike
 from sysdyn.runtime.model.system import System
 from sysdyn.runtime.numerics.equilibrate import sparse_factors
-from sysdyn.runtime.numerics.matching import matched
+from sysdyn.runtime.numerics.matching import match_rows
 from sysdyn.runtime.numerics.points import uniform
 
 PIVOT = tuning.PIVOT
@@ -119,8 +119,8 @@ def _pair(system: System, entry: Floats) -> Ints:
     np.maximum.at(largest, columns, scaled)
     large = (scaled >= PIVOT * largest[columns]) & (scaled > 0.0)
     begin = np.concatenate([[0], np.cumsum(np.bincount(columns[large], minlength=system.unknowns))]).astype(np.int32)
-    first = matched(Pattern(system.rows, system.unknowns, begin, np.ascontiguousarray(rows[large], dtype=np.int32)))
-    return matched(pattern, first)
+    first = match_rows(Pattern(system.rows, system.unknowns, begin, np.ascontiguousarray(rows[large], dtype=np.int32)))
+    return match_rows(pattern, first)
 
 
 def nominals_of_quantities(system: System, point: tuple[float, Floats, Floats], nominal: Floats, step: float) -> Floats:

@@ -77,7 +77,7 @@ class Sampled:
         return (self.values, self.late) if self.there is None else self.there
 
 
-def apart(coarse: Sampled, fine: Sampled) -> Floats:
+def distance_of_runs(coarse: Sampled, fine: Sampled) -> Floats:
     """How far two runs' values are from each other [instants, quantities], within the time tolerance, both ways: what
     one of them has must be between values that the other one takes about there.  At the end, where a quantity grows
     without bound (x' = x^2 at its pole), its rate allows any difference, but only one of them has been so far.  Between
@@ -129,14 +129,14 @@ def zero(coarse: Sampled, fine: Sampled, target: Floats) -> NDArray[np.bool_]:
     found &= (seen <= noise) | ((now <= FALLS * before) & (now <= FAINT * noise))
     if fine.left_open is not None:
         with np.errstate(invalid="ignore"):  # values that are no numbers
-            far = apart(coarse, fine).max(axis=0)
+            far = distance_of_runs(coarse, fine).max(axis=0)
         lost = ~found & (far > target * fine.largest) & (far > LOST * seen)
         if lost.any():
             found |= lost & (seen <= fine.left_open())
     return np.asarray(found)
 
 
-def _used(coarse: Sampled, fine: Sampled, target: Floats) -> NDArray[np.bool_]:
+def _has_size(coarse: Sampled, fine: Sampled, target: Floats) -> NDArray[np.bool_]:
     """Quantities [quantities] that are asked for, and more than round-off."""
     return np.asarray((fine.largest != 0.0) & np.isfinite(target) & ~zero(coarse, fine, target))
 
@@ -156,7 +156,7 @@ def difference(coarse: Sampled, fine: Sampled, target: Floats) -> tuple[float, f
     seen = np.maximum(np.abs(before), np.abs(fine.values)).max(axis=0)[use]
     with np.errstate(all="ignore"):
         unlike = (size[use] > UNSEEN * seen) & (np.abs(size - coarse.largest)[use] > ALIKE * size[use])
-        relative = apart(coarse, fine)[:, use].max(axis=0, initial=0.0) / size[use]
+        relative = distance_of_runs(coarse, fine)[:, use].max(axis=0, initial=0.0) / size[use]
     relative = np.where(np.isfinite(relative) & ~unlike, relative, np.inf)
     return float(relative.max()), float((relative / target[use]).max())
 
@@ -167,7 +167,7 @@ def before_fronts(coarse: Sampled, fine: Sampled, target: Floats) -> tuple[float
     """
     if fine.front is None or not fine.front.any():
         return 0.0, 0.0
-    use = _used(coarse, fine, target)
+    use = _has_size(coarse, fine, target)
     relative = fine.front[use] / fine.largest[use]
     return float(relative.max(initial=0.0)), float((relative / target[use]).max(initial=0.0))
 
@@ -181,7 +181,7 @@ def passed_over(coarse: Sampled, fine: Sampled, target: Floats, credit: float) -
     if fine.passed is None or not fine.passed.any() or coarse.own[0].shape != fine.values.shape:
         return 0.0, 0.0
     at = fine.passed[:, 0] > 0.0
-    use = _used(coarse, fine, target)
+    use = _has_size(coarse, fine, target)
     if not use.any():
         return 0.0, 0.0
     longer, most = fine.passed[at].T
@@ -205,11 +205,11 @@ def left_at_rest(coarse: Sampled, fine: Sampled, target: Floats, *, known: bool 
     before, size = coarse.own[0], fine.largest
     if before.shape != fine.values.shape or len(before) < 2 or fine.jumps:
         return 0.0, 0.0  # what jumps may be nothing between its jumps
-    use = _used(coarse, fine, target)  # round-off has not come to rest
+    use = _has_size(coarse, fine, target)  # round-off has not come to rest
     if not use.any():
         return 0.0, 0.0
     with np.errstate(all="ignore"):
-        far = apart(coarse, fine)[:, use]
+        far = distance_of_runs(coarse, fine)[:, use]
         over = far / (size * target)[use]
     if not np.isfinite(over).all() or not over.any():
         return 0.0, 0.0
@@ -221,7 +221,7 @@ def left_at_rest(coarse: Sampled, fine: Sampled, target: Floats, *, known: bool 
     return float(left / size[use][column]), float(left / (size * target)[use][column])
 
 
-def parted(coarse: Sampled, fine: Sampled, target: Floats) -> bool:
+def have_diverged(coarse: Sampled, fine: Sampled, target: Floats) -> bool:
     """Whether two runs differ somewhere by PARTED times all that a quantity was since its start, and by much of what it
     is: then they ran away, and that both end alike, beside what has become of them, says little.  At fine tolerances a
     front that begins at next to nothing looks alike, and nothing runs away.
@@ -232,6 +232,6 @@ def parted(coarse: Sampled, fine: Sampled, target: Floats) -> bool:
     with np.errstate(all="ignore"):
         most = np.maximum.accumulate(np.abs(values), axis=0)[:-1]
         now = np.maximum(np.abs(values), np.abs(before))[1:]
-        away = apart(coarse, fine)[1:] > np.maximum(PARTED * most, MUCH * now)
+        away = distance_of_runs(coarse, fine)[1:] > np.maximum(PARTED * most, MUCH * now)
     away &= np.abs(values[0]) > fine.noise
     return bool(away.any()) and bool((away & ~zero(coarse, fine, target)).any())

@@ -54,9 +54,9 @@ class Quantities:
         """What errors of the stored quantities are relative to [columns]: the largest met (largest [observed]), but no
         less than round-off of the largest of the same unit, unknowns (magnitude [kinds and units]) among them.
         """
-        return np.asarray(np.maximum(largest[self.places], ROUND_OFF * self.beside(largest, magnitude)))
+        return np.asarray(np.maximum(largest[self.places], ROUND_OFF * self.largest_of_unit(largest, magnitude)))
 
-    def beside(self, largest: Floats, magnitude: Floats) -> Floats:
+    def largest_of_unit(self, largest: Floats, magnitude: Floats) -> Floats:
         """The largest of the unit of each stored quantity [columns], unknowns among them."""
         last = self._beside
         if last is not None and last[0] is largest and last[1] is magnitude:
@@ -80,13 +80,13 @@ class Quantities:
 
     def nominal(self, largest: Floats, magnitude: Floats) -> dict[str, float]:
         """Nominal magnitude of each stored quantity."""
-        return self.named(self.sizes(largest, magnitude))
+        return self.by_name(self.sizes(largest, magnitude))
 
     def terms(self, largest: Floats) -> dict[str, float]:
         """Largest terms of each stored quantity, where it is a difference; largest [observed]."""
-        return self.named(largest[self.places])
+        return self.by_name(largest[self.places])
 
-    def named(self, values: Floats) -> dict[str, float]:
+    def by_name(self, values: Floats) -> dict[str, float]:
         """Values of the stored quantities [columns] by their names."""
         return dict(zip(self.names, values.tolist(), strict=True))
 
@@ -94,7 +94,7 @@ class Quantities:
         """Largest values and terms of the compared quantities of a run [compared]."""
         return np.append(finished.largest[self.places], [_turned_over(meter, finished) for meter in self.meters])
 
-    def asked(self, options: Options) -> Floats:
+    def accuracy_asked(self, options: Options) -> Floats:
         """Accuracy wanted of each compared quantity [compared]; infinite where none is."""
         names = list(self.compared)
         target = np.full(len(names), np.inf if options.accuracy is None else options.accuracy)

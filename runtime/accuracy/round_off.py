@@ -50,7 +50,7 @@ def blur(system: System, point: Point, places: Ints, enough: Floats) -> Floats:
     return np.where(np.isnan(found), 0.0, found)
 
 
-def blurred(runs: Runs, t: float, asked: Floats) -> tuple[Estimate, ...]:
+def worst_blur(runs: Runs, t: float, asked: Floats) -> tuple[Estimate, ...]:
     """The quantity that round-off leaves farthest from what was asked [compared] at the end t (s) of the last run, as
     one that misses it; none where all are known, or the model is large.
     """
@@ -60,7 +60,7 @@ def blurred(runs: Runs, t: float, asked: Floats) -> tuple[Estimate, ...]:
         return ()
     y, yd = (x[: system.form.written] for x in finished.last[0]())
     seen = writer.seen()
-    size = np.maximum(told.beside(finished.largest, finished.magnitude), [seen[name] for name in told.names])
+    size = np.maximum(told.largest_of_unit(finished.largest, finished.magnitude), [seen[name] for name in told.names])
     steps = np.ones(size.size)
     if told.to_range.size:
         # round-off of x adds up like a random walk in a small difference x - 1e8 m, from step to step

@@ -139,7 +139,7 @@ class Runs:
             # of steep laws points that settle as loosely would count as failed
             settled_to=ROUGH * rtol if self.controlled and not self.system.form.scales else 0.0,
             draft=draft,
-            unstrained=self._unstrained(rtol, draft=draft),
+            unstrained=self._window_steps(rtol, draft=draft),
             tried=self.patience is not None,
             audited=bool(self.quantities.meters),
             opening=self.opening,
@@ -152,7 +152,7 @@ class Runs:
             fixed_step=options.euler_step if self.method == "euler" else None,
         )
 
-    def _unstrained(self, rtol: float, *, draft: bool) -> int:
+    def _window_steps(self, rtol: float, *, draft: bool) -> int:
         """Steps of the windows in which a run is not to be strained: of a draft, which a smaller tolerance may tame; of
         steep laws, of which Newton fails at any tolerance, of a method that another one follows.
         """
@@ -183,10 +183,14 @@ class Runs:
             self.done[2].append(traced[:0])  # what it still has in memory comes to its file in time
         taken = rows[(kind & (TRACE | STEP)) > 0]
         if taken.size:
-            kept = taken[self.watched(taken[:, 0], self._observed(taken))] if self.watched is not None else taken[:0]
+            kept = (
+                taken[self.watched(taken[:, 0], self._observe_columns(taken))]
+                if self.watched is not None
+                else taken[:0]
+            )
             self.samples = [*self.samples[:-1], *([kept] if kept.size else []), taken[-1:]]
 
-    def _observed(self, rows: Floats) -> Floats:
+    def _observe_columns(self, rows: Floats) -> Floats:
         return rows[:, lib.ROW_HEAD : lib.ROW_HEAD + len(self.names)]
 
     def _progress(self, t: float) -> None:
@@ -249,7 +253,7 @@ class Runs:
             magnitude = group_maxima(self.system, integration.sizes.magnitude)
             nominal = self.quantities.nominal(integration.driver.largest(), magnitude)
             attributes: dict[str, str | float | int] = {**self.accounts.attributes(None), "met": 0, "judged": ""}
-            self.writer.finish(nominal, attributes, final=False, events=integration.happened())
+            self.writer.finish(nominal, attributes, final=False, events=integration.past_events())
             return
         self.keeping.drop(self.writer)
 
@@ -259,12 +263,12 @@ class Runs:
         writer = self.writer if self.done is None else self.done[2]
         return writer.trace if isinstance(writer, Held) else None
 
-    def sampled(self, tolerance: float, longest: float) -> Sampled:
+    def run_sampled(self, tolerance: float, longest: float) -> Sampled:
         """One run of the accuracy control; longest: step, as part of the span."""
         self.controlled = True
         if self._hopeless(tolerance):
             raise SolverFailure("max_steps", self.options.t_start, 0.0, smooth=True)
-        return self.compared.sampled(tolerance, self.run(tolerance, None, longest), self.quantities)
+        return self.compared.sample_run(tolerance, self.run(tolerance, None, longest), self.quantities)
 
     def _hopeless(self, tolerance: float) -> bool:
         """Whether the bdf would take more steps than the patience with it: on a smooth motion they grow with the power
@@ -281,7 +285,7 @@ class Runs:
         """Nominal value of each stored quantity: what errors of the run that stands were relative to."""
         sampled = self.compared.samplings
         if sampled and finished is self.compared.finished:
-            return self.quantities.named(sampled[-1].largest[: self.quantities.places.size])
+            return self.quantities.by_name(sampled[-1].largest[: self.quantities.places.size])
         return self.quantities.nominal(finished.largest, finished.magnitude)
 
     def open_balances(self) -> Floats:
@@ -290,15 +294,15 @@ class Runs:
         span = self.finished.reached - self.options.t_start
         return self.compared.left_open(self.finished, self.system).balances(span)
 
-    def collected(self) -> Samples:
+    def collect_samples(self) -> Samples:
         """Samples of the run that stands in the trace."""
         parts = self.samples if self.done is None else self.done[1]
         rows = np.concatenate(parts) if parts else np.zeros((0, lib.ROW_HEAD + 2 * len(self.names)))
         largest = np.zeros(len(self.names)) if self.done is None else self.done[0].largest
-        kind, values = rows[:, 1].astype(np.int32), self._observed(rows)
+        kind, values = rows[:, 1].astype(np.int32), self._observe_columns(rows)
         return Samples(self.names, rows[:, 0], kind, values, rows[:, 6], rows[:, 7], largest)
 
 
 def _observed_names(description: Description) -> tuple[str, ...]:
     rows = [description.rows[k] for k in description.rows_of("observe")]
-    return tuple(row.named(k) for row in rows for k in range(row.size))
+    return tuple(row.name_of(k) for row in rows for k in range(row.size))

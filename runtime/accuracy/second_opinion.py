@@ -21,7 +21,7 @@ from sysdyn.runtime.model.failures import SolverFailure
 OTHER = {"bdf": "radau", "radau": "bdf", "rosenbrock": "radau", "dopri": "radau", "energy": "dopri"}
 
 
-def confirmed(runs: Runs, achieved: Achieved, target: Floats) -> Achieved:
+def confirm(runs: Runs, achieved: Achieved, target: Floats) -> Achieved:
     """`achieved` of these runs as a second one by another method leaves it: the larger of both estimates, not met where
     they are further apart than target [quantities] or the second run fails.
     """
@@ -37,7 +37,7 @@ def confirmed(runs: Runs, achieved: Achieved, target: Floats) -> Achieved:
         second.instants.close(runs.instants.common)
         second.compared.jumps = runs.compared.jumps
         try:
-            apart, over = difference(runs.compared.samplings[-1], second.sampled(tolerance, LONGEST), target)
+            apart, over = difference(runs.compared.samplings[-1], second.run_sampled(tolerance, LONGEST), target)
         except SolverFailure as failure:
             if failure.cause == "max_wall":
                 raise

@@ -11,7 +11,7 @@ from dataclasses import replace
 
 import numpy as np
 from sysdyn.runtime.comparison.curve import Floats
-from sysdyn.runtime.comparison.quantities import Pair, compared, lonely, ratio_of
+from sysdyn.runtime.comparison.quantities import Pair, compare_quantities, lonely, ratio_of
 from sysdyn.runtime.comparison.verdict import (
     SHARE,
     Compared,
@@ -49,13 +49,13 @@ def compare(ref: Source, test: Source, tolerance: Tolerance, convert: Convert = 
     span = float(times[0][0]), float(times[0][-1])
     tau = SHARE * (span[1] - span[0]) if tolerance.tau is None else tolerance.tau
     asked = replace(tolerance, tau=tau)
-    pairs, unmatched, notes = _matched(ref, test, convert)
+    pairs, unmatched, notes = _match_quantities(ref, test, convert)
     if not pairs and not any(c.status == "unit" for c in unmatched):
         raise Incomparable(_nothing_common(ref, test))
-    found = compared(ref, test, times, pairs, asked, rescaled[0])
+    found = compare_quantities(ref, test, times, pairs, asked, rescaled[0])
     missing = [c.name for c in unmatched if c.status == "missing"]
     extra = [c.name for c in unmatched if c.status == "extra"]
-    renamed = _renamed(ref, test, times, missing, extra, asked, rescaled[0], convert)
+    renamed = _renamed_pairs(ref, test, times, missing, extra, asked, rescaled[0], convert)
     gone = {name for pair in renamed for name in pair}
     others = [c for c in unmatched if c.name not in gone]
     others += [
@@ -82,7 +82,9 @@ def _sound(which: str, time: Floats) -> None:
         raise Incomparable(f"the {which} has more than {LONELY} rows at instants that others share")
 
 
-def _matched(ref: Source, test: Source, convert: Convert) -> tuple[list[Pair], list[Compared], tuple[str, ...]]:
+def _match_quantities(
+    ref: Source, test: Source, convert: Convert
+) -> tuple[list[Pair], list[Compared], tuple[str, ...]]:
     pairs, unmatched, notes = [], [], []
     for name, about in ref.quantities.items():
         if name not in test.quantities:
@@ -110,7 +112,7 @@ def _nothing_common(ref: Source, test: Source) -> str:
     return f"the traces have no quantity in common: {first} and {second}"
 
 
-def _renamed(
+def _renamed_pairs(
     ref: Source,
     test: Source,
     times: tuple[Floats, Floats],
@@ -130,7 +132,7 @@ def _renamed(
                 continue
             tried += 1
             pair = Pair(ref.quantities[old], test.quantities[new], *conversion)
-            if compared(ref, test, times, [pair], tolerance, time_scale)[0].equal:
+            if compare_quantities(ref, test, times, [pair], tolerance, time_scale)[0].equal:
                 found.append((old, new))
                 break
     return found
@@ -150,7 +152,7 @@ def _coverage(times: tuple[Floats, Floats], tau: float) -> list[Compared]:
     return found
 
 
-def _ordered(one: Sequence[TraceEvent], two: list[TraceEvent], tau: float) -> list[TraceEvent]:
+def _order_events(one: Sequence[TraceEvent], two: list[TraceEvent], tau: float) -> list[TraceEvent]:
     """The second events, those within tau of each other in the order of the first ones."""
     for k, wanted in enumerate(one[: len(two)]):
         ends = (at for at in range(k, len(two)) if two[at].name == wanted.name or two[at].time - two[k].time > tau)
@@ -166,7 +168,7 @@ def _events(ref: Source, test: Source, rescaled: tuple[float, float], tau: float
     Events of one instant have no order.
     """
     one = ref.events
-    two = _ordered(one, [TraceEvent(e.time * rescaled[0] + rescaled[1], e.name) for e in test.events], tau)
+    two = _order_events(one, [TraceEvent(e.time * rescaled[0] + rescaled[1], e.name) for e in test.events], tau)
     if not one and not two:
         return []
     worst = Worst(0.0, one[0].time if one else two[0].time)

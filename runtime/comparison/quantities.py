@@ -60,7 +60,7 @@ class _State:
     note: str = ""
 
 
-def compared(
+def compare_quantities(
     ref: Source,
     test: Source,
     times: tuple[Floats, Floats],
@@ -195,11 +195,11 @@ def _block(state: _State, curves: tuple[Curve, Curve], cells: tuple[Ints, Ints],
         whole = [d[cell] & d[cell + 1] for d, cell in zip(defined, cells, strict=True)]
         one = np.flatnonzero(whole[0] != whole[1])
         if one.size:
-            _undefined(state, float(block.left[one[0]]), "only one of the traces is a number there")
+            _undefined_quantity(state, float(block.left[one[0]]), "only one of the traces is a number there")
         bad = ~np.isfinite(bound)
         wild = np.flatnonzero(bad & whole[0] & whole[1])
         if wild.size:
-            _undefined(state, float(block.left[wild[0]]), "the difference is beyond floating point")
+            _undefined_quantity(state, float(block.left[wild[0]]), "the difference is beyond floating point")
         bound = np.where(bad, 0.0, bound)
         size = np.where(bad, 0.0, size)
     deviation = np.maximum(size[0], size[3])
@@ -295,7 +295,7 @@ def lonely(time: Floats) -> Flags:
     return ~(np.append(step, False) | np.insert(step, 0, False))
 
 
-def _undefined(state: _State, time: float, note: str) -> None:
+def _undefined_quantity(state: _State, time: float, note: str) -> None:
     if state.status != "nonfinite":
         state.status, state.note, state.worst = "nonfinite", note, Worst(math.inf, time)
 
@@ -320,7 +320,7 @@ def _nonfinite(state: _State, curves: tuple[Curve, Curve], tau: float) -> None:
         bad = np.flatnonzero(~found & inside)
         if bad.size:
             value, other = curves[one].values[rows[bad[0]]], {"reference": "test", "test": "reference"}[which]
-            _undefined(state, float(at[bad[0]]), f"the {which} is {value:g} there")
+            _undefined_quantity(state, float(at[bad[0]]), f"the {which} is {value:g} there")
             there = float(np.interp(at[bad[0]], time, curves[two].values))
             state.worst = replace(state.worst, **{which: float(value), other: there})
 

@@ -13,7 +13,7 @@ import numpy as np
 from sysdyn.runtime.comparison.curve import Floats
 from sysdyn.runtime.comparison.verdict import About, Incomparable, TraceEvent
 from sysdyn.runtime.model.failures import TraceError
-from sysdyn.runtime.trace.opening import opened
+from sysdyn.runtime.trace.opening import open_regular
 from sysdyn.runtime.trace.trace_store import in_words
 
 CACHE = 1 << 16
@@ -28,7 +28,7 @@ class Recorded:
     def __init__(self, path: str | Path, name: str | None = None) -> None:
         self.path = name or str(path)
         with self._faults():
-            self._file: Any = opened(path, rdcc_nbytes=CACHE)
+            self._file: Any = open_regular(path, rdcc_nbytes=CACHE)
         try:
             with self._faults():
                 self._layout()

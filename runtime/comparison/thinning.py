@@ -17,7 +17,7 @@ CLOSE = tuning.INSTANT
 """Of the span: rows nearer than this are the two sides of a jump or kink."""
 
 
-def thinned(curves: Sequence[Curve], limits: Floats, kept_as: Sequence[Curve] | None = None) -> Ints:
+def thin_rows(curves: Sequence[Curve], limits: Floats, kept_as: Sequence[Curve] | None = None) -> Ints:
     """Rows to keep of curves on one time [n]; limits [curves]: largest difference in each one's unit.
 
     kept_as: the same rows with the rates that are kept (those of a curve without rates are estimated).
@@ -44,7 +44,7 @@ def thinned(curves: Sequence[Curve], limits: Floats, kept_as: Sequence[Curve] | 
         ends = np.array([a, b])
         zero = np.zeros(left.size, dtype=np.int64)
         with np.errstate(over="ignore", invalid="ignore"):
-            whole = np.stack([bernstein(_at(c, ends), zero, left, right) for c in kept_as])
+            whole = np.stack([bernstein(_interpolate(c, ends), zero, left, right) for c in kept_as])
             off = np.nan_to_num(np.abs(whole - full[:, :, part]) / scale, nan=np.inf).max(axis=(0, 1))
         if off.max() <= 1.0:
             continue
@@ -55,7 +55,7 @@ def thinned(curves: Sequence[Curve], limits: Floats, kept_as: Sequence[Curve] | 
     return np.array(sorted(kept), dtype=np.int64)
 
 
-def _at(curve: Curve, rows: Ints) -> Curve:
+def _interpolate(curve: Curve, rows: Ints) -> Curve:
     return Curve(curve.time[rows], curve.values[rows], None if curve.rates is None else curve.rates[rows])
 
 
@@ -79,7 +79,7 @@ def estimated_rates(time: Floats, values: Floats, limit: float) -> Floats:
     return rates
 
 
-def rounded(values: Floats, step: float) -> Floats:
+def round_to_step(values: Floats, step: float) -> Floats:
     """Values as multiples of the power of two at or below a step: off by at most half of it, and short when packed."""
     if not (step > 0.0 and np.isfinite(step)):
         return values

@@ -63,7 +63,7 @@ def band(curve: Curve, instant: float, tau: float) -> tuple[float, float]:
 
 def _one_way(r: Curve, s: Curve, left: Floats, right: Floats, moment: Floats, eps: float, tau: float) -> Outside:
     """Distance of s from the band around r; r is monotone in its cells."""
-    left, right, owner = _divided(r, left, right, moment, tau)
+    left, right, owner = _divide_cells(r, left, right, moment, tau)
     distance = np.zeros(int(owner[-1]) + 1 if owner.size else 0)
     time = np.zeros_like(distance)
     tables = (_Ranges(r.values), _Ranges(-r.values))
@@ -93,7 +93,7 @@ def _one_way(r: Curve, s: Curve, left: Floats, right: Floats, moment: Floats, ep
     return Outside(distance, time)
 
 
-def _divided(r: Curve, left: Floats, right: Floats, moment: Floats, tau: float) -> tuple[Floats, Floats, Ints]:
+def _divide_cells(r: Curve, left: Floats, right: Floats, moment: Floats, tau: float) -> tuple[Floats, Floats, Ints]:
     """Cells divided at `moment` and at rows of r, moved by tau or not; owner: the cell that each part is of."""
     cuts = np.concatenate([moment, r.time, r.time - tau, r.time + tau])
     cell = np.searchsorted(left, cuts, side="right") - 1

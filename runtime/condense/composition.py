@@ -9,7 +9,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 from sysdyn.runtime.model.description import Floats, Ints
-from sysdyn.runtime.model.patterns import numbered
+from sysdyn.runtime.model.patterns import number_pairs
 from sysdyn.values import dataclass
 
 
@@ -54,7 +54,7 @@ def ranges(first: Ints, count: NDArray[np.integer]) -> Ints:
     return found
 
 
-def composed(start: Ints, kept: Ints, through: Ints) -> Composition:
+def compose_definitions(start: Ints, kept: Ints, through: Ints) -> Composition:
     """Start [eliminated + 1]: the terms of each row; kept, through [terms]: the kept unknown that a term reads, or the
     eliminated one, whose row stands before; -1.
     """
@@ -74,7 +74,7 @@ def composed(start: Ints, kept: Ints, through: Ints) -> Composition:
         places = np.concatenate(columns)
         row, column = owner[term], np.concatenate([kept[direct], places[entry]])
         # one entry of T for each kept unknown that a row reads
-        slot, begin, each = numbered(row, column, number, int(column.max(initial=-1)) + 1)
+        slot, begin, each = number_pairs(row, column, number, int(column.max(initial=-1)) + 1)
         size = np.diff(begin)
         own = places_of(size > 0)
         rows.append(np.repeat(own, size[own]))
@@ -86,7 +86,7 @@ def composed(start: Ints, kept: Ints, through: Ints) -> Composition:
         level.append(slot)
         at += each.size
     row, column = np.concatenate(rows), np.concatenate(columns)
-    final, starts, source = numbered(row, column, number, int(column.max(initial=-1)) + 1)
+    final, starts, source = number_pairs(row, column, number, int(column.max(initial=-1)) + 1)
     del row, column, rows, columns
     parts = [(final[slot], term, by) for slot, term, by in zip(level, terms, read, strict=True)]
     direct_entry = np.concatenate([entry[by < 0] for entry, _, by in parts])

@@ -22,9 +22,9 @@ from sysdyn.runtime.model.failures import RowLabel
 from sysdyn.runtime.model.forms import stretches
 from sysdyn.runtime.model.lines import stretches_of, table
 from sysdyn.runtime.model.patterns import Pattern, Places, compress
-from sysdyn.runtime.model.redirected import redirected
+from sysdyn.runtime.model.redirected import redirect_entries
 from sysdyn.runtime.model.system import LARGE, System
-from sysdyn.runtime.numerics.matching import matched
+from sysdyn.runtime.numerics.matching import match_rows
 from sysdyn.runtime.numerics.ordering import SMALL
 from sysdyn.runtime.numerics.stretches import Ascents, Stretches, whole_of
 
@@ -117,7 +117,7 @@ class Condensed:
         number, place = np.cumsum(own < 0) - 1, np.cumsum(free) - 1
         where = Places(place[self.pattern.row[entries]], number[self.pattern.columns_of()[entries]])
         rest, _ = compress(open_.size, left.size, [where])
-        found = matched(rest)
+        found = match_rows(rest)
         if (found < 0).any():
             self.own_rows = own.astype(np.int32)
             return False
@@ -145,7 +145,7 @@ class Condensed:
         """Places of the unknowns that nothing reads."""
         return whole_of(self._unread)
 
-    def expanded(self, kept: Floats, stays: Floats | Stretches[Any], *, rate: bool = False) -> Floats:
+    def expand_point(self, kept: Floats, stays: Floats | Stretches[Any], *, rate: bool = False) -> Floats:
         """Every unknown [unknowns of the whole] of a point, or the rate of each, by those of what is kept and of what
         nothing reads.
         """
@@ -243,7 +243,7 @@ class Condensed:
         order = np.argsort(row[here], kind="stable")
         return stretches(row[here][order], q[here][order], form.k_f[here][order])
 
-    def _rated(self) -> Mask:
+    def _rate_columns(self) -> Mask:
         """Of the kept unknowns [unknowns] those whose derivatives enter a row that is not q' - f by itself."""
         blocks, form = self.whole.description.blocks, self.whole.form
         planned = [call.block for call in (*form.calls, *form.scales)]
@@ -253,7 +253,7 @@ class Condensed:
         read = frozenset[int]().union(*(families for families in rates if families))
         return np.isin(self.whole.family_of[self.kept], sorted(read))
 
-    def _trimmed(self) -> lib.System:
+    def _trim_rows(self) -> lib.System:
         """The whole system without rows q' - f that are not kept."""
         whole, form = self.whole, self.whole.form
         kept = np.zeros(whole.rows, dtype=bool)
@@ -262,7 +262,7 @@ class Condensed:
         number = self._number
         slot_q, slot_f = (self._hold(np.ascontiguousarray(number[slots][here])) for slots in whole.slots[:2])
         spans = stretches(*(np.ascontiguousarray(part[here]) for part in (form.k_row, form.k_q, form.k_f)))
-        elsewhere = redirected(whole, number, number, self.places)
+        elsewhere = redirect_entries(whole, number, number, self.places)
         self._keep.append(elsewhere)
         made = elsewhere.core
         made.kinematics = int(here.sum())
@@ -295,10 +295,10 @@ class Condensed:
         self._mark("audited", [kernel.reads for kernel in self._kernels(AUDITED)])
         self._mark("rated", [kernel.rates for kernel in self._kernels(SHOWING)])
         self._own = self._own_rows()
-        self._trim = self._trimmed()
+        self._trim = self._trim_rows()
         del self._number
         unknown, row = self._spans(self.kept), self._spans(self.kept_rows)
-        rate = self._spans(self.kept, self._rated())
+        rate = self._spans(self.kept, self._rate_columns())
         rest = self._spans(self.kept_rows, self.kept_rows >= (whole.form.kinematics if self._own.size else 0))
         self.condensed = lib.Condensed(
             full=c.addressof(self._trim),

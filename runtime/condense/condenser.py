@@ -49,15 +49,15 @@ class Forms:
         """Elimination order of the stepped form's matrices [kept], found once."""
         stepped, whole = self.stepped, self.stepped.whole
 
-        def made() -> Order:
+        def make_order() -> Order:
             if stepped.paired:
                 return Order(paired_order(stepped.pattern), paired=True)
             order = any_order(stepped.pattern, leaving=bool(whole.form.scales))
             return with_pairs(stepped.pattern, order, lambda: stepped.own_rows)
 
-        return whole.once(("order", *stepped.key), made)
+        return whole.once(("order", *stepped.key), make_order)
 
-    def completed(self, t: float, y: Floats) -> Floats:
+    def complete_point(self, t: float, y: Floats) -> Floats:
         """Y [unknowns as written] at t (s) with the displacements that nothing reads where their constraints want them:
         runs do not integrate those, and what moves charge at once passes all of a node's.
         """
@@ -85,7 +85,7 @@ class _Condenser:
         """What came of the last numbers asked, and their digest."""
 
     @cached_property
-    def settled(self) -> System:
+    def settled_system(self) -> System:
         """What points are settled with: made when rows are left for it."""
         return self.whole.another("settled")
 
@@ -96,13 +96,13 @@ class _Condenser:
             digest.update(np.ascontiguousarray(item).data)
         asked = digest.digest()
         if self._last is None or self._last[1] != asked:
-            self._last = self._renewed(t, y, yd), asked
+            self._last = self._renew(t, y, yd), asked
         found = self._last[0]
         if found is not None:
             found.bind()
         return found
 
-    def _renewed(self, t: float, y: Floats, yd: Floats) -> Forms | None:
+    def _renew(self, t: float, y: Floats, yd: Floats) -> Forms | None:
         whole = self.whole
         large, zero = whole.unknowns > LARGE, np.zeros(whole.unknowns)
         constant = whole.residual(t, zero, zero)
@@ -127,9 +127,9 @@ class _Condenser:
             whole.put_away(whole=True)
             whole.spare()
             whole.trim()
-            return self._made(held)
+            return self._make_forms(held)
         if self._forms is None:
-            self._forms = self._made([found, numbers])
+            self._forms = self._make_forms([found, numbers])
         elif not numbers.same(self._numbers):
             self._numbers, factors = numbers, self._terms.values(numbers.factor)
             self._straights.renew(numbers)
@@ -137,7 +137,7 @@ class _Condenser:
             self._forms.settled.renew(factors)
         return self._forms
 
-    def _made(self, held: list[Any]) -> Forms | None:
+    def _make_forms(self, held: list[Any]) -> Forms | None:
         """The forms of an elimination and its sums, which are taken out of held: what they need no more goes."""
         numbers: Sums = held.pop()
         found: Elimination = held.pop()
@@ -146,7 +146,7 @@ class _Condenser:
         rows[found.row] = False
         rows[whole.form.k_row[np.isin(whole.form.k_q, found.unread)]] = False
         del found
-        terms, straights = numbers.composed(whole.unknowns), Straights(numbers)
+        terms, straights = numbers.composition(whole.unknowns), Straights(numbers)
         straights.renew(numbers)
         factors = terms.values(numbers.factor)
         if whole.unknowns > LARGE:
@@ -154,13 +154,13 @@ class _Condenser:
             terms, numbers = terms.places(), numbers.places()
         else:
             self._terms, self._straights, self._numbers = terms, straights, numbers
-        kept = settled_rows(whole, self.settled, ~rows, numbers)
+        kept = settled_rows(whole, self.settled_system, ~rows, numbers)
         if kept is None:
             return None
-        rows_of = {whole: places_of(rows), self.settled: places_of(kept)}
+        rows_of = {whole: places_of(rows), self.settled_system: places_of(kept)}
         del rows, kept
         made = {}
-        for system in (self.settled, whole):
+        for system in (self.settled_system, whole):
             form = made[system] = Condensed(system, numbers, terms, straights, rows_of.pop(system))
             form.renew(factors)
             if whole.unknowns > LARGE:
@@ -175,11 +175,11 @@ class _Condenser:
         for form in made.values():
             if whole.unknowns > LARGE:
                 form.put_away()
-        room = Room(max(form.places for form in made.values()), whole, self.settled)
-        return Forms(made[whole], made[self.settled], room)
+        room = Room(max(form.places for form in made.values()), whole, self.settled_system)
+        return Forms(made[whole], made[self.settled_system], room)
 
 
-def condensed(system: System, t: float, y: Floats, yd: Floats) -> Forms | None:
+def condense_model(system: System, t: float, y: Floats, yd: Floats) -> Forms | None:
     """A model as written (form 3) without what constant sums define; None where little would be gained, or where the
     rest does not follow from what is kept alone.  The next call for the system may take the structures of this one.
     """
@@ -194,11 +194,11 @@ def condensed(system: System, t: float, y: Floats, yd: Floats) -> Forms | None:
 def departures(system: System) -> list[tuple[str, str]]:
     """What leaves the runs of a model as written that have neither events nor jumps: names and why."""
     zero = np.zeros(system.unknowns)
-    found = condensed(system, 0.0, zero, zero)
+    found = condense_model(system, 0.0, zero, zero)
     if found is None:
         return []
     parts = ((found.stepped.gone, DEFINED), (found.stepped.unread, UNREAD))
-    names = [f.name if not f.elements else f"{f.named(0)} .." for f in system.description.families]
+    names = [f.name if not f.elements else f"{f.name_of(0)} .." for f in system.description.families]
     return [
         (f"{names[k]} ({number} of {system.description.families[k].size})", why)
         for places, why in parts

@@ -19,7 +19,7 @@ from sysdyn.runtime import tuning
 from sysdyn.runtime.condense.composition import places_of, ranges
 from sysdyn.runtime.model.description import Description, Floats, Ints
 from sysdyn.runtime.model.forms import FORMS
-from sysdyn.runtime.model.patterns import numbered
+from sysdyn.runtime.model.patterns import number_pairs
 from sysdyn.runtime.model.system import System
 from sysdyn.runtime.numerics.equilibrate import sparse_factors
 from sysdyn.values import dataclass
@@ -168,7 +168,7 @@ class _Search:
         self.columns, self.rows = system.pattern.columns_of(), system.pattern.row
         self.of, self.allowed = system.family_of[self.columns], allowed
         entries = np.arange(self.rows.size, dtype=np.int32)
-        self.start, self.entry = numbered(self.rows, entries, system.rows, entries.size)[1:]
+        self.start, self.entry = number_pairs(self.rows, entries, system.rows, entries.size)[1:]
         del entries
         self.seen: dict[tuple[int, int], _Span] = {}
         self.defined, self.free = np.zeros(system.unknowns, dtype=bool), np.ones(system.rows, dtype=bool)
@@ -230,13 +230,13 @@ class _Search:
         below = 1 + max((self.below[k] for k in others if k in self.reads), default=0)
         if below + self.above.get(family, 0) > LONGEST:
             return
-        self._deepened(family, others, below)
+        self._definition_depths(family, others, below)
         self.defined[self.columns[chosen]] = True
         self.free[self.rows[chosen]] = False
         self.read |= others
         self.parts.append((family, chosen))
 
-    def _deepened(self, family: int, others: set[int], below: int) -> None:
+    def _definition_depths(self, family: int, others: set[int], below: int) -> None:
         """below[k]: definitions that k is made of one after the other, its own with them; above[k]: those that it is
         part of.
         """

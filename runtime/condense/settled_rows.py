@@ -8,7 +8,7 @@ from sysdyn.runtime.condense.sums import Sums
 from sysdyn.runtime.model.description import Ints
 from sysdyn.runtime.model.patterns import Places, compress
 from sysdyn.runtime.model.system import System
-from sysdyn.runtime.numerics.matching import matched
+from sysdyn.runtime.numerics.matching import match_rows
 from sysdyn.runtime.numerics.points import distinct
 
 RATE_OF = {
@@ -25,7 +25,7 @@ def _defining(rows: Ints, columns: Ints) -> bool:
     """Whether each of the rows can be told for a column of its own, by their entries."""
     own, each = distinct(rows), distinct(columns)
     pattern, _ = compress(own.size, each.size, [Places(np.searchsorted(own, rows), np.searchsorted(each, columns))])
-    return int((matched(pattern) >= 0).sum()) == own.size
+    return int((match_rows(pattern) >= 0).sum()) == own.size
 
 
 def settled_rows(stepped: System, settled: System, gone: Mask, numbers: Sums) -> Mask | None:

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import numpy as np
 from numpy.typing import NDArray
-from sysdyn.runtime.condense.composition import Composition, composed, places_of, ranges
+from sysdyn.runtime.condense.composition import Composition, compose_definitions, places_of, ranges
 from sysdyn.runtime.condense.elimination import Elimination, Mask
 from sysdyn.runtime.model import core_library as lib
 from sysdyn.runtime.model.description import Floats, Ints
@@ -34,10 +34,10 @@ class Sums:
     kept: Ints
     unread: Ints
 
-    def composed(self, unknowns: int) -> Composition:
+    def composition(self, unknowns: int) -> Composition:
         """T by rows, of z."""
         number, later = numbers_of(unknowns, self.kept), numbers_of(unknowns, self.place)
-        return composed(self.start, number[self.source], later[self.source])
+        return compose_definitions(self.start, number[self.source], later[self.source])
 
     def places(self) -> Sums:
         """What of it is no number, and no term: of a large system the room counts."""

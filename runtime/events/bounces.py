@@ -41,17 +41,17 @@ class Bounce:
     flight: float
 
 
-def thrown(t: float, value: float, speed: float, pull: float) -> Bounce:
+def is_thrown(t: float, value: float, speed: float, pull: float) -> Bounce:
     """A gap with its value, that opens at t (s) at a speed and is pulled back."""
     back = speed > 0.0 and pull > 0.0
     height, flight = (0.5 * speed * speed / pull, 2.0 * speed / pull) if back else (np.inf, np.inf)
     return Bounce(min(value, 0.0), height, t, flight)
 
 
-def begun(t: float, values: Floats, gaps: Sequence[Contact]) -> dict[int, Bounce]:
+def begun_flights(t: float, values: Floats, gaps: Sequence[Contact]) -> dict[int, Bounce]:
     """The flights that begin at t (s), by rows of gaps; values [observed] there."""
     speed_of = {c.value: (float(values[c.rate]), -float(values[c.acceleration])) for c in gaps}
-    return {row: thrown(t, float(values[row]), *motion) for row, motion in speed_of.items()}
+    return {row: is_thrown(t, float(values[row]), *motion) for row, motion in speed_of.items()}
 
 
 def new(now: dict[int, Bounce], before: dict[int, Bounce]) -> list[int]:
@@ -83,7 +83,7 @@ def flights(
     speed, pull = (4.0 * one - two) / (2.0 * step), (2.0 * one - two) / step**2
     found = []
     for row, side in falls:
-        bounce = thrown(t, side * float(now[row]), side * float(speed[row]), side * float(pull[row]))
+        bounce = is_thrown(t, side * float(now[row]), side * float(speed[row]), side * float(pull[row]))
         if np.isfinite(bounce.flight):
             found.append((bounce, 2.0 * float(np.sqrt(2.0 * SEEN * observer.zero(row) / (side * pull[row])))))
     return found

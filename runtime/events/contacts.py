@@ -181,7 +181,7 @@ class Contacts:
         up[self._sensed] = self.p[self._sense] > 0.0
         return self.active.copy(), up
 
-    def changed(self, before: Standing) -> dict[int, tuple[str, str]]:
+    def changed_contacts(self, before: Standing) -> dict[int, tuple[str, str]]:
         """How contacts stood and stand that do otherwise, by their numbers."""
         now = self.standing()
         differ = np.flatnonzero((before[0] != now[0]) | (before[1] != now[1])).tolist()
@@ -214,9 +214,9 @@ class Contacts:
         """The direction of a slip in the plane, as a flow."""
         size = float(np.hypot(*along))
         if size > 0.0:
-            self.p[list(contact.direction)] = max(BESIDE, self._unresolved(contact)) * along / size
+            self.p[list(contact.direction)] = max(BESIDE, self._unresolved_speed(contact)) * along / size
 
-    def _unresolved(self, contact: Contact) -> float:
+    def _unresolved_speed(self, contact: Contact) -> float:
         """The speed (m/s and the like) that steps leave open of friction in the plane: of the largest terms of its
         flows, as a block on a moving table has the speed of the table.
         """
@@ -226,7 +226,9 @@ class Contacts:
         """Whether the speed of friction in the plane is one."""
         speed = contact.aim[4]
         covered = float(np.hypot(*self.p[list(contact.direction)]))
-        return bool(values[speed] > max(self.observer.zero(speed), self._unresolved(contact), WIDER / 2 * covered))
+        return bool(
+            values[speed] > max(self.observer.zero(speed), self._unresolved_speed(contact), WIDER / 2 * covered)
+        )
 
     def halting(self, touched: Sequence[int]) -> list[int]:
         """The contacts of those touched which slip in a plane."""
@@ -330,7 +332,7 @@ class Contacts:
             return bool(self.active[k] or sense == 0.0)
         if self.active[k]:
             beyond = abs(values[c.multiplier]) > values[c.bound] + zero(c.multiplier)
-            return bool(beyond or self._overstrained(k, impulse))
+            return bool(beyond or self._is_overstrained(k, impulse))
         if sense == 0.0:
             return True
         slip = sense * values[c.value]
@@ -345,7 +347,7 @@ class Contacts:
             self._finite = frozenset(k for k in frictions if np.ptp([self._bound(k, b) for b in bounds]) <= UNTOLD)
         return self._finite
 
-    def _overstrained(self, k: int, impulse: float) -> bool:
+    def _is_overstrained(self, k: int, impulse: float) -> bool:
         """Whether friction that holds takes an impulse, which it has not got."""
         return bool(self._finite and k in self._finite and abs(impulse) > self.impulse(self.contacts[k]))
 
@@ -357,12 +359,12 @@ class Contacts:
     def _planar(self, k: int, c: Contact, values: Floats, impulse: float) -> bool:
         zero = self.observer.zero
         if self.active[k]:
-            return bool(values[c.upper] < -zero(c.multiplier) or self._overstrained(k, impulse))
+            return bool(values[c.upper] < -zero(c.multiplier) or self._is_overstrained(k, impulse))
         if self.p[c.sense] == 0.0:
             return True
         return bool(values[c.value] < 0.0 or (not self._moves(c, values) and values[c.rate] < -zero(c.rate)))
 
-    def passed(self, t: float, y: Floats, found: tuple[Floats, Floats, Floats]) -> Floats:
+    def passed_impulses(self, t: float, y: Floats, found: tuple[Floats, Floats, Floats]) -> Floats:
         """Impulses of flow [contacts]: what passed inequalities of flows where displacements jumped; none at a start,
         where they are sought.
         """
@@ -380,7 +382,7 @@ class Contacts:
 
     def backwards(self, t: float, y: Floats, found: tuple[Floats, Floats, Floats]) -> list[int]:
         """Open inequalities of flows through which an impulse went backwards."""
-        passed, zero = self.passed(t, y, found), self.observer.zero
+        passed, zero = self.passed_impulses(t, y, found), self.observer.zero
         least = [-zero(c.value) * self.time for c in self.contacts]
         return [int(k) for k in np.flatnonzero((passed < least) & ~self.active & ~self.barred)]
 

@@ -20,8 +20,8 @@ from sysdyn.runtime.events.pivoting import NoActiveSetError, Pivoting, Settle
 from sysdyn.runtime.model.description import Floats
 from sysdyn.runtime.model.held_rows import switch_rows
 from sysdyn.runtime.model.system import System
-from sysdyn.runtime.numerics.equilibrate import equilibrated, factors
-from sysdyn.runtime.numerics.rank import CERTAIN, count, decomposed, sure_solver
+from sysdyn.runtime.numerics.equilibrate import equilibrate, factors
+from sysdyn.runtime.numerics.rank import CERTAIN, count, singular_decomposition, sure_solver
 
 DENSE = tuning.DENSE
 """Unknowns up to which matrices are full; larger models are taken as they come."""
@@ -75,7 +75,7 @@ class Determined:
             return np.zeros((0, 0)), []
         n = self._system.form.written
         scaled, column = _pencil(self._system, *self._system.jacobian(t, y[:n], yd[:n]))
-        right = decomposed(scaled)[2]
+        right = singular_decomposition(scaled)[2]
         return (right[len(right) - number :] * column)[:, :n], np.flatnonzero(part > NOTHING).tolist()
 
     def _open(self, t: float, y: Floats, yd: Floats) -> tuple[int, Floats, NDArray[np.bool_]]:
@@ -92,7 +92,7 @@ class Determined:
             if sure_solver(scaled, CERTAIN) is not None:
                 self._regular[key] = 0, np.zeros(len(key)), np.ones(n, dtype=bool)
                 return self._regular[key]
-            left, sigma, right = decomposed(scaled)
+            left, sigma, right = singular_decomposition(scaled)
             some = count(sigma, CERTAIN)
             part, told = np.zeros(len(key)), np.linalg.norm(right[some:, :n], axis=0) <= NOTHING
             if some < sigma.size:
@@ -172,7 +172,7 @@ class Determined:
             n = self._system.form.written
             jy, jyd = (self._system.dense(part) for part in self._system.jacobian(t, y[:n], yd[:n]))
             finite = np.isfinite(jy).all() and np.isfinite(jyd).all()
-            self._indices[key] = _index_of(*equilibrated(jyd, jy)) if finite else FAR
+            self._indices[key] = _index_of(*equilibrate(jyd, jy)) if finite else FAR
         return self._indices[key]
 
     def _goes_on(self, k: int, points: tuple[Point, Point], told: NDArray[np.bool_], *, small: bool) -> bool:
@@ -183,12 +183,12 @@ class Determined:
         (y, yd), (other, other_d) = points
         flows = self._moves & told
         if small:
-            moves = _same(yd, other_d, self._moves & self._rated, NOTHING) and _same(y, other, flows, NOTHING)
+            moves = _same(yd, other_d, self._moves & self._rated_unknowns, NOTHING) and _same(y, other, flows, NOTHING)
             return moves or self.contacts.contacts[k].hold < 0
         least = self.contacts.observer.zero(self.contacts.contacts[k].value) / SAME  # what is less is no flow
         time = self.contacts.time
         size = np.abs(y[: flows.size][flows]).max(initial=least) / time if time > 0.0 else 0.0
-        return _same(y, other, flows, SAME, least) and _same(yd, other_d, flows & self._rated, SAME, size)
+        return _same(y, other, flows, SAME, least) and _same(yd, other_d, flows & self._rated_unknowns, SAME, size)
 
     @cached_property
     def _moves(self) -> NDArray[np.bool_]:
@@ -196,7 +196,7 @@ class Determined:
         return found
 
     @cached_property
-    def _rated(self) -> NDArray[np.bool_]:
+    def _rated_unknowns(self) -> NDArray[np.bool_]:
         """Unknowns [unknowns as written] whose rates the equations as written hold."""
         found = np.zeros(self._system.unknowns, dtype=bool)
         found[self._system.pattern.columns_of()[self._system.structural()[1]]] = True
@@ -234,7 +234,7 @@ def _index_of(e: Floats, b: Floats) -> int:
     size = np.where(rates, rated, 1.0)
     fast = float((own / size)[rates].max(initial=0.0)) or 1.0
     ways = (e / size[:, None] + b / np.where(rates, size * fast * close, 1.0)[:, None] for close in CLOSE)
-    near, far = (float(decomposed(m)[1].min(initial=1.0)) for m in ways)
+    near, far = (float(singular_decomposition(m)[1].min(initial=1.0)) for m in ways)
     return round(float(np.log(near / far) / np.log(CLOSE[1] / CLOSE[0]))) if min(near, far) > 0.0 else FAR
 
 

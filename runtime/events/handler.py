@@ -13,7 +13,7 @@ from collections.abc import Sequence, Set
 import numpy as np
 from numpy.typing import NDArray
 from sysdyn.runtime import tuning
-from sysdyn.runtime.events.bounces import LEAST, PART, begun, flights, new
+from sysdyn.runtime.events.bounces import LEAST, PART, begun_flights, flights, new
 from sysdyn.runtime.events.choices import Choices
 from sysdyn.runtime.events.conditions import Conditions, Round, with_momenta
 from sysdyn.runtime.events.contacts import Standing as Stood
@@ -116,7 +116,7 @@ class Handler(Watching):
 
     # -- the start -----------------------------------------------------------------------------------------------
 
-    def sampled(self, t: float, y: Floats, yd: Floats) -> list[int] | None:
+    def assign_samples(self, t: float, y: Floats, yd: Floats) -> list[int] | None:
         """Places of p that samples due at a start, and the conditions that become true by them, assign as the point
         has it; p has the values then.  None where they assign what p does not hold.
         """
@@ -133,8 +133,8 @@ class Handler(Watching):
         """
         values = self.observer(t, y, yd)
         self._take_sides(t, values, np.ones_like(self.side), self.observer.zeros(self._row))
-        self._bounded(t, values)
-        drives = self.succession.pushed(t, y, yd, values) if self.restart is not None else None
+        self._verify_bounds(t, values)
+        drives = self.succession.driving_friction(t, y, yd, values) if self.restart is not None else None
         if drives is not None:
             raise SolverFailure("drives", t, 0.0, drives)
         self.turns.seen(t, (y, yd))
@@ -143,7 +143,7 @@ class Handler(Watching):
         due, anew = self.due(t), self.kinks.begin(values)
         if due and not sampled:
             return self.fire(t, y, yd, due)
-        return self.settled(t, y, yd, self.contacts.standing()) if anew else None
+        return self.settle(t, y, yd, self.contacts.standing()) if anew else None
 
     def _take_sides(self, t: float, values: Floats, before: Floats, zeros: Floats) -> None:
         """The side of each relation, which was `before` [relations], as that of what moves below `zeros` is: one that a
@@ -162,7 +162,7 @@ class Handler(Watching):
 
     # -- what happens --------------------------------------------------------------------------------------------
 
-    def _crossed(
+    def _turn_sides(
         self, t: float, y: Floats, yd: Floats, which: Sequence[Watched]
     ) -> tuple[Sequence[Watched], list[int]]:
         """Turns sides and branches of laws; what then counts of what is watched, the relations that have crossed."""
@@ -175,7 +175,7 @@ class Handler(Watching):
             if w.relation >= 0 and w.side * values[w.row] > self.observer.zero(w.row)
         }
         self._hold(values, crossed)
-        which = self.turns.passed(t, which)
+        which = self.turns.verify_passage(t, which)
         for w in which:
             if w.relation >= 0:
                 self.side[w.relation] = -float(w.side)
@@ -213,8 +213,8 @@ class Handler(Watching):
         said, stood, flew = self.contacts.standing(), self.kinks.state(), self.bounces
         self._assigned[:] = self.observer.exact[self._row] == ASSIGNED
         self.observer.exact[self.observer.exact == ASSIGNED] = 0
-        self.kinks.anew()
-        which, crossed = self._crossed(t, y, yd, which)
+        self.kinks.begin_instant()
+        which, crossed = self._turn_sides(t, y, yd, which)
         begun, y, yd = y, y.copy(), yd.copy()
         y = self._cascade(t, y, yd, samples, crossed)
         # contacts that are touched, and what is not as simple as an assignment
@@ -229,14 +229,14 @@ class Handler(Watching):
             return None
         # the point behind it all
         self.struck = touched[0] if lone and touched and len(which) == 1 and not self.rounds else -1
-        point = self._followed(t, self.settled(t, y, yd, said, touched))
+        point = self._follow_conditions(t, self.settle(t, y, yd, said, touched))
         self._due_at_once(t, point, crossed)
         self.turns.seen(t, point)
         self._return(t, begun, point, which)
         thrown = new(self.bounces, flew)
-        self.struck = self.struck if self._bounced(self.struck, thrown) else -1
+        self.struck = self.struck if self._has_bounced(self.struck, thrown) else -1
         self.simple &= not thrown
-        self.happened += self.kinks.happened(t, stood)
+        self.happened += self.kinks.changes(t, stood)
         self.passes = self.kinks.passing(stood, self.observer(t, *point)) if self.kinks.peaks else np.inf
         return point
 
@@ -283,7 +283,7 @@ class Handler(Watching):
                 raise SolverFailure("zeno", t, 0.0, self._names())
             self.soon = max(self.soon, LEAST * least)
 
-    def _bounced(self, k: int, thrown: list[int]) -> bool:
+    def _has_bounced(self, k: int, thrown: list[int]) -> bool:
         """Whether gap k has closed and opened again, and nothing else did; thrown: rows of gaps."""
         closed, contacts = self.succession.impacts.closed, self.plan.contacts
         bounced = k >= 0 and closed == [k] and thrown == [contacts[k].value]
@@ -294,7 +294,7 @@ class Handler(Watching):
         pairs = zip(self.plan.contacts, self.contacts.active.tolist(), strict=True)
         return not any(holds and (c.kind not in kinds or c.hold >= 0) for c, holds in pairs)
 
-    def _followed(self, t: float, point: Point) -> Point:
+    def _follow_conditions(self, t: float, point: Point) -> Point:
         """The point after the conditions that became true where the constraints were found anew."""
         for _ in range(CASCADE):
             fired = self._risen(())
@@ -302,31 +302,31 @@ class Handler(Watching):
                 return point
             self.simple, self.struck, said = False, -1, self.contacts.standing()
             y = self._assign(t, *point, [(self.plan.whens[k].name, self.plan.whens[k].assignments) for k in fired])
-            point = self.settled(t, y, point[1], said)
+            point = self.settle(t, y, point[1], said)
         raise SolverFailure("chatter", t, 0.0, self._names())
 
-    def settled(self, t: float, y: Floats, yd: Floats, said: Stood, touched: Sequence[int] = ()) -> Point:
+    def settle(self, t: float, y: Floats, yd: Floats, said: Stood, touched: Sequence[int] = ()) -> Point:
         """The consistent point with the constraints and the branches that hold from now on."""
         self.kinks.leave(self.observer(t, y, yd))
-        point = self._constrained(t, y, yd, said, touched)
+        point = self._settle_constraints(t, y, yd, said, touched)
         try:
             while self.kinks.turn(self.observer(t, *point)):
-                point = self._constrained(t, *point, self.contacts.standing())
+                point = self._settle_constraints(t, *point, self.contacts.standing())
         except NoBranchError as error:
             raise SolverFailure("slides" if error.pushed else "chatter", t, 0.0, ", ".join(error.names)) from error
         return point
 
-    def anew(self, t: float, y: Floats, yd: Floats) -> Point:
+    def restart_at_jump(self, t: float, y: Floats, yd: Floats) -> Point:
         """The point behind an instant at which the text jumps, and behind the conditions that become true by it."""
         self.simple, self.struck, self.rounds, self.soon, stood = True, -1, [], 0.0, self.kinks.state()
-        self.kinks.anew()
+        self.kinks.begin_instant()
         flew = self.bounces
-        point = self._followed(t, self.settled(t, y, yd, self.contacts.standing()))
+        point = self._follow_conditions(t, self.settle(t, y, yd, self.contacts.standing()))
         self.simple &= not new(self.bounces, flew)
-        self.happened += self.kinks.happened(t, stood)
+        self.happened += self.kinks.changes(t, stood)
         return point
 
-    def _constrained(self, t: float, y: Floats, yd: Floats, said: Stood, touched: Sequence[int] = ()) -> Point:
+    def _settle_constraints(self, t: float, y: Floats, yd: Floats, said: Stood, touched: Sequence[int] = ()) -> Point:
         """The consistent point with the constraints that hold from now on; SolverFailure where there is none."""
         assert self.restart is not None
         if not self.plan.contacts:
@@ -355,12 +355,12 @@ class Handler(Watching):
         free = ~self.contacts.active[self._gap]
         here = values[self._gaps] <= self.observer.zeros(self._gaps)
         still = {contacts[k].value for k in set(self._gap[free].tolist()) - met}
-        begin = begun(t, values, [contacts[k] for k in self._gap[free & here]])
+        begin = begun_flights(t, values, [contacts[k] for k in self._gap[free & here]])
         self.bounces = begin | {row: bounce for row, bounce in self.bounces.items() if row in still}
 
     def _note(self, t: float, said: Stood, struck: Set[int]) -> None:
         """What contacts that stand otherwise than `said`, and impacts, are called."""
-        words = self.contacts.changed(said)
+        words = self.contacts.changed_contacts(said)
         for k in sorted({*words, *struck}):
             contact = self.plan.contacts[k]
             if k in words and contact.kind != "follows":
@@ -395,7 +395,7 @@ class Handler(Watching):
                 now.append(f"{a.name} = {values[a.row]:.9g}")
             element = assignments[0].name.rpartition(".")[0] if assignments else ""
             self.happened.append(Happened(t, name, element, ", ".join(said), ", ".join(now)))
-        self.kinks.anew()
+        self.kinks.begin_instant()
         if any(a.kind == "flow" for _, assignments in events for a in assignments):
             settled = self.restart.instant.system if self.restart else self.system
             y = with_momenta(settled, t, y, yd)
@@ -411,7 +411,7 @@ class Handler(Watching):
             raise SolverFailure("drives", t, 0.0, self.plan.contacts[min(sinking)].name)
         self._sinking = sinking
 
-    def _bounded(self, t: float, values: Floats) -> None:
+    def _verify_bounds(self, t: float, values: Floats) -> None:
         """SolverFailure where the bound of dry friction is negative."""
         for k in np.flatnonzero(values[self._bound] < -self.observer.zeros(self._bound)):
             raise SolverFailure("drives", t, 0.0, self._bounds[k].name)
@@ -419,7 +419,7 @@ class Handler(Watching):
     def _renew(self, t: float, y: Floats, yd: Floats, was: Floats | None = None) -> None:
         """Sides after a jump; was: values [observed] before an assignment."""
         values = self.observer(t, y, yd)
-        self._bounded(t, values)
+        self._verify_bounds(t, values)
         here, zeros = values[self._row], self.observer.zeros(self._row)
         if was is not None:
             rounding = self.observer.rounding(self._row, here)

@@ -165,7 +165,7 @@ class Impacts:
 
     def _struck(self, blow: _Blow) -> _Struck:
         """Behind the impulses of inequalities, with the frictions that hold as they are."""
-        aim, of = blow.aim, partial(self._of, blow)
+        aim, of = blow.aim, partial(self._effect_of, blow)
         now, seen = of([]), set[frozenset[int]]()
         had = now.impulses
         for _ in range(TRIALS * (1 + len(aim))):
@@ -189,7 +189,7 @@ class Impacts:
                     return self._struck(blow._replace(aim=aim | dict.fromkeys(jammed, 0.0)))
         raise NoActiveSetError(tuple(self.contacts.contacts[k].name for k in aim))
 
-    def _of(self, blow: _Blow, struck: list[int]) -> _Struck:
+    def _effect_of(self, blow: _Blow, struck: list[int]) -> _Struck:
         """What impulses of these alone make."""
         contacts, zero = self.contacts, self.contacts.observer.zero
         point, aim = blow.point, blow.aim

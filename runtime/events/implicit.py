@@ -19,7 +19,7 @@ from sysdyn.runtime.model.description import Floats
 from sysdyn.runtime.model.held_rows import switch_rows
 from sysdyn.runtime.model.system import System
 from sysdyn.runtime.numerics.equilibrate import factors
-from sysdyn.runtime.numerics.rank import decomposed
+from sysdyn.runtime.numerics.rank import singular_decomposition
 
 DENSE = tuning.DENSE
 """Unknowns up to which matrices are full; of larger models nothing is told."""
@@ -125,7 +125,7 @@ def base_of(
     held, turned = held.copy(), np.zeros(held.size, dtype=bool)
     while True:
         matrix[row], right[row, -1] = np.where(held[:, None], slope, unit), -np.where(held, value, multiplier)
-        found, open_ = _solved(matrix, right)
+        found, open_ = _solve_graded(matrix, right)
         if found is not None:
             return found, held
         part = np.where(turned, 0.0, open_[row])
@@ -135,13 +135,13 @@ def base_of(
         held[k], turned[k] = not held[k], True
 
 
-def _solved(matrix: Floats, right: Floats) -> tuple[Floats | None, Floats]:
+def _solve_graded(matrix: Floats, right: Floats) -> tuple[Floats | None, Floats]:
     """The solution of a square system whose rows and columns are of very different size; None: it is singular, and how
     much each row [rows] has to do with that.
     """
     row, column = (factor[:, None] for factor in factors(matrix))
     even = row * matrix * column.T
-    left, sigma, _ = decomposed(even)
+    left, sigma, _ = singular_decomposition(even)
     if not sigma[-1:].min(initial=1.0) > REGULAR:
         return None, np.abs(left[:, -1])
     found: Floats = column * np.linalg.solve(even, row * right)

@@ -67,7 +67,7 @@ class Kinks:
         self._turned[k] = [branch]
         self._tried.add(k)
 
-    def anew(self) -> None:
+    def begin_instant(self) -> None:
         """A new instant: nothing has turned yet."""
         self._turned, self._tried = {}, set()
 
@@ -76,7 +76,7 @@ class Kinks:
         for kink in self.kinks:
             on = abs(values[kink.value]) <= self.observer.zero(kink.value)
             self.p[kink.branch] = (ABOVE if kink.jumps else LIVE) if on else np.sign(values[kink.value])
-        self.anew()
+        self.begin_instant()
         return any(kink.jumps for kink in self.kinks)
 
     def leave(self, values: Floats) -> None:
@@ -97,12 +97,12 @@ class Kinks:
                 seen = self._turned.setdefault(k, [])
                 seen.append(better)
                 if len(seen) > TURNS:
-                    raise NoBranchError(self._named(), pushed=kink.jumps)
+                    raise NoBranchError(self._name_of(), pushed=kink.jumps)
             self.p[kink.branch] = better
             return True
         return False
 
-    def _named(self) -> tuple[str, ...]:
+    def _name_of(self) -> tuple[str, ...]:
         return tuple(f"{self.kinks[k].name} ({self.kinks[k].element})" for k in self._turned)
 
     def _better(self, k: int, kink: Kink, values: Floats) -> float | None:
@@ -146,7 +146,7 @@ class Kinks:
         rate = float(values[kink.rate]) if kink.rate >= 0 else 0.0
         return 0.0 if abs(rate) <= self.observer.zero(kink.rate) else rate
 
-    def happened(self, t: float, before: Sequence[float]) -> list[Happened]:
+    def changes(self, t: float, before: Sequence[float]) -> list[Happened]:
         """What has changed."""
         found = []
         for kink, was in zip(self.kinks, before, strict=True):

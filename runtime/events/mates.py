@@ -24,7 +24,7 @@ from sysdyn.runtime.model.description import Floats
 from sysdyn.runtime.model.held_rows import switch_rows
 from sysdyn.runtime.model.system import System
 from sysdyn.runtime.numerics.equilibrate import factors
-from sysdyn.runtime.numerics.rank import CERTAIN, count, decomposed
+from sysdyn.runtime.numerics.rank import CERTAIN, count, singular_decomposition
 
 LARGE = 800
 """Unknowns up to which full matrices are decomposed."""
@@ -122,11 +122,11 @@ class _Search:
         full = system.dense(jy) + GENERIC * system.dense(jyd)
         values = full if blocks else self._values(y, yd)
         row, column = factors(full)
-        left, sigma, right = decomposed(row[:, None] * full * column)
+        left, sigma, right = singular_decomposition(row[:, None] * full * column)
         some = count(sigma, CERTAIN)
         if some == sigma.size:
             return none
-        depend = _without(left[:, some:] * row[:, None], self.other)[self.rows[free]]
+        depend = _null_span(left[:, some:] * row[:, None], self.other)[self.rows[free]]
         shared = right[some:].T * column[:, None]
         shared = shared[self.places[free]] if blocks else values[self.rows[free]] @ shared
         return _pairs(depend) & _pairs(shared)
@@ -141,11 +141,11 @@ class _Search:
         return slopes
 
 
-def _without(vectors: Floats, rows: Mask) -> Floats:
+def _null_span(vectors: Floats, rows: Mask) -> Floats:
     """What of the span of columns [n, number] is zero in these rows."""
     if not rows.any():
         return vectors
-    _, sigma, right = decomposed(vectors[rows])
+    _, sigma, right = singular_decomposition(vectors[rows])
     size = np.zeros(vectors.shape[1])
     size[: sigma.size] = sigma
     return np.asarray(vectors @ right[size <= SAME * max(float(np.abs(vectors).max()), 1e-300)].T)
@@ -155,7 +155,7 @@ def _pairs(vectors: Floats) -> NDArray[np.bool_]:
     """Which e_k - e_l lie in the span of columns [items, number]."""
     if not vectors.shape[1]:
         return np.zeros((vectors.shape[0],) * 2, dtype=bool)
-    basis, size, _ = decomposed(vectors)
+    basis, size, _ = singular_decomposition(vectors)
     basis = basis[:, : count(size, SAME)]
     p = basis @ basis.T
     diagonal = np.diag(p)

@@ -37,7 +37,7 @@ class Memory:
         own = [tuple(stood[k] for k in part) for part in self._parts]
         return [(s, tuple(k for k in touched if k in part), part[0]) for s, part in zip(own, self._parts, strict=True)]
 
-    def followed(self, stood: State, touched: Sequence[int]) -> State | None:
+    def recall(self, stood: State, touched: Sequence[int]) -> State | None:
         """The state that followed when this happened before in each part; None where it did not in one."""
         found = [self._followed.get(key) for key in self._keys(stood, touched)]
         after = list(stood)

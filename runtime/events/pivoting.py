@@ -46,13 +46,13 @@ def once(contacts: Contacts, settle: Settle) -> Settle:
     """
     known = dict[tuple[float, tuple[float, ...], bytes, bytes], tuple[Floats, Floats, Floats] | None]()
 
-    def asked(t: float, y: Floats, yd: Floats) -> tuple[Floats, Floats, Floats] | None:
+    def asks(t: float, y: Floats, yd: Floats) -> tuple[Floats, Floats, Floats] | None:
         key = t, contacts.state(), y.tobytes(), yd.tobytes()
         if key not in known:
             known[key] = settle(t, y, yd)
         return known[key]
 
-    return asked
+    return asks
 
 
 class NoActiveSetError(Exception):
@@ -82,14 +82,14 @@ class Pivoting:
         self.contacts.active[:], self.contacts.p[:] = before
         self.contacts.reversed.clear()
         try:
-            return self._pivoted(t, y, yd, settle, turned)
+            return self._pivot(t, y, yd, settle, turned)
         except NoActiveSetError:
             self.contacts.open = frozenset(k for k, ways in turned.items() if len(ways) > 1)
             if not self.contacts.open:
                 raise
         self.contacts.active[:], self.contacts.p[:] = before
         try:
-            return self._pivoted(t, y, yd, settle, turned)
+            return self._pivot(t, y, yd, settle, turned)
         finally:
             self.contacts.open = frozenset()
 
@@ -102,7 +102,7 @@ class Pivoting:
         contacts, p, known = self.contacts, self.contacts.p.copy(), self.contacts.observer.largest.copy()
         turned = contacts.active.copy()
         try:
-            return self._pivoted(t, y, yd, settle, {}, once=True)
+            return self._pivot(t, y, yd, settle, {}, once=True)
         except NoActiveSetError:
             contacts.p[:] = p
         for later in AHEAD:
@@ -128,7 +128,7 @@ class Pivoting:
         self.contacts.apply()
         return told[1]
 
-    def _pivoted(
+    def _pivot(
         self, t: float, y: Floats, yd: Floats, settle: Settle, turned: dict[int, set[bool]], *, once: bool = False
     ) -> Point:
         """The same; turned: those that were turned, and whether they held; once: no set is tried twice, nor beside one
@@ -152,7 +152,7 @@ class Pivoting:
                 self.contacts.active[:], (_, first, values), block, fewest = block[0], block, None, 0
                 self.contacts.turn(first, values)
                 continue
-            found = found or (None if once else self._beside(t, y, yd, settle, seen))
+            found = found or (None if once else self._near_point(t, y, yd, settle, seen))
             if found is None:
                 break
             # of a set that does not hold no size stays: where it has no rank its multipliers are without bound
@@ -190,10 +190,10 @@ class Pivoting:
         held = [k for k in wrong if self.contacts.active[k]]
         if any(found[2][self.contacts.multiplier[k]] <= 0.0 for k in held):
             return False
-        passed = self.contacts.passed(t, y, found)
+        passed = self.contacts.passed_impulses(t, y, found)
         return all(passed[k] > 0.0 for k in wrong if not self.contacts.active[k])
 
-    def _beside(
+    def _near_point(
         self, t: float, y: Floats, yd: Floats, settle: Settle, seen: Counter[tuple[float, ...]]
     ) -> tuple[Floats, Floats, Floats] | None:
         """Where the active set contradicts itself (a source that two diodes short): the point of a near one, not seen

@@ -98,7 +98,7 @@ def _behind_samples(
     try:
         for _ in range(SAMPLES):
             handler.back(begun)
-            places = handler.sampled(t0, y, yd)
+            places = handler.assign_samples(t0, y, yd)
             assigned = system.description.p[places or []]
             if behind is not None and np.array_equal(assigned, behind[2]):
                 handler.back(behind[1])

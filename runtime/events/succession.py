@@ -68,7 +68,7 @@ class Succession:
         self.contacts.through.clear()
         self._guards(t, y, yd)
         stood = self.contacts.state()
-        known = None if stalled else self._remembered(t, (y, yd), stood, touched)
+        known = None if stalled else self._recall_set(t, (y, yd), stood, touched)
         if known is not None:
             return known, False
         y = self.impacts.after(t, y, yd, self._strike, restart.instant.system, blow=self.blow)
@@ -81,13 +81,13 @@ class Succession:
         self.contacts.apply()
         found = self.determined.fit(t, y, yd, once(self.contacts, restart.struck), touched)
         still = touched if self.contacts.state() == stood else ()
-        if self._tied(t, found, still):
+        if self._is_tied(t, found, still):
             found = self._ahead(t, found, self.contacts.state()) or found
         elif not stalled and self._beside_idle(t, found, stood):  # twice at an instant would go round in a circle
             found = self._handed_on(t, found)
         if not self._impacts:
             self._memory.learn(stood, touched, self.contacts.state())
-        return self._closed(t, found), True
+        return self._close_gaps(t, found), True
 
     def _let_through(self, k: int, t: float, y: Floats, yd: Floats) -> None:
         """Whether the value of a relation goes through zero: neither it nor its rate follows the sense at once."""
@@ -112,7 +112,7 @@ class Succession:
         contacts.become(stood)
         return ends
 
-    def pushed(self, t: float, y: Floats, yd: Floats, values: Floats) -> str | None:
+    def driving_friction(self, t: float, y: Floats, yd: Floats, values: Floats) -> str | None:
         """The same of frictions that slip, and whose bound a reaction tells: it has the sign that its text gives it."""
         contacts, zero = self.contacts, self.observer.zero
         free = {k for k, c in enumerate(contacts.contacts) if c.hold >= 0 and not contacts.active[k]}
@@ -135,7 +135,7 @@ class Succession:
                     return contact.name
         return None
 
-    def _closed(self, t: float, point: Point) -> Point:
+    def _close_gaps(self, t: float, point: Point) -> Point:
         """The point with gaps that hold brought to nothing: one that is caught in flight is only nearly closed."""
         values = self.observer(t, *point)
         gaps = [c.value for k, c in enumerate(self.plan.contacts) if c.kind == "phi" and self.contacts.active[k]]
@@ -144,9 +144,9 @@ class Succession:
         y, yd, done = self._restart.settler.moved(t, *point)
         return (y, yd) if done else point
 
-    def _remembered(self, t: float, point: Point, stood: tuple[float, ...], touched: Sequence[int]) -> Point | None:
+    def _recall_set(self, t: float, point: Point, stood: tuple[float, ...], touched: Sequence[int]) -> Point | None:
         """The point with the active set that followed when this happened before, where it fits; None where not."""
-        after = self._memory.followed(stood, touched)
+        after = self._memory.recall(stood, touched)
         if after is None:
             return None
         before = self.contacts.active.copy(), self.p.copy()
@@ -154,14 +154,14 @@ class Succession:
         found = self._restart.struck(t, *point)
         if found is not None:
             fits = self.contacts.fits(t, point[0], found)
-            fits = fits and (bool(touched) or self._decided(before[0], self.observer(t, *found[:2])))
+            fits = fits and (bool(touched) or self._is_decided(before[0], self.observer(t, *found[:2])))
             if fits and self.determined.leaves(t, *found[:2]) == 0:
                 return found[0], found[1]
         self.contacts.active[:], self.p[:] = before
         self.contacts.apply()
         return None
 
-    def _decided(self, before: NDArray[np.bool_], values: Floats) -> bool:
+    def _is_decided(self, before: NDArray[np.bool_], values: Floats) -> bool:
         """Whether the inequalities that turned could not have stayed as they were `before`: what would hold and open
         alike at this instant (a diode that conducts beside a capacitor) stays where nothing touched it.
         """
@@ -173,7 +173,7 @@ class Succession:
             values[c.value] > zero(c.value) or values[c.rate] > zero(c.rate) for c in open_
         )
 
-    def _tied(self, t: float, point: Point, touched: Sequence[int]) -> bool:
+    def _is_tied(self, t: float, point: Point, touched: Sequence[int]) -> bool:
         """Whether something touched may hold or not at this instant, but a gap that has bounced; or friction that is
         at its bound while others hold what it joins.
         """

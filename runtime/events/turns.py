@@ -32,12 +32,12 @@ class Turns:
         left = {k for k in self._of.values() if k not in self._acting and not active[k]}
         if not left or self._succession.restart is None:
             return
-        drives = self._succession.pushed(t, *point, self._observer(t, *point))
+        drives = self._succession.driving_friction(t, *point, self._observer(t, *point))
         if drives is not None:
             raise SolverFailure("drives", t, 0.0, drives)
         self._acting |= {k for k in left if self._succession.acts(k, t, *point)}
 
-    def passed(self, t: float, which: Sequence[Watched]) -> Sequence[Watched]:
+    def verify_passage(self, t: float, which: Sequence[Watched]) -> Sequence[Watched]:
         """What else passes zero there; SolverFailure where c of a friction that slips and acts does, but at a corner,
         which turns it back (abs): that is seen again behind it.
         """

@@ -51,7 +51,7 @@ class Watches:
         """Some of them one by one."""
         return [self[k] for k in np.flatnonzero(mask).tolist()]
 
-    def of(self, mask: NDArray[np.bool_]) -> Watches:
+    def select(self, mask: NDArray[np.bool_]) -> Watches:
         """Some of them."""
         columns = self.relation, self.contact, self.kink, self.row, self.side, self.rate
         return Watches(*(column[mask] for column in columns))
@@ -101,7 +101,7 @@ class Candidates:
         if bent:
             part, branch = self._kinks, p[self._branch]
             kept[part] = np.where(self._slides, branch == SLIDES, (branch != SLIDES) & (branch != -every.side[part]))
-        found = every.of(kept)
+        found = every.select(kept)
         slips = np.flatnonzero(self._sense[kept] >= 0)
         found.side[slips] = np.where(p[self._sense[kept][slips]] < 0.0, -1, 1)
         return found

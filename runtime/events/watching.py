@@ -50,29 +50,29 @@ class Watching:
         self._bounces = bounces
         self.observer.small[list(bounces)] = FALLEN * SMALL
 
-    def watched(self) -> Watches:
+    def all_watched(self) -> Watches:
         """Everything whose change ends a piece: a relation on neither side yet is watched on both."""
         contacts = self.contacts
         return self._candidates.now(self.side, contacts.active, contacts.barred | self._frozen, self.p)
 
     def core(self) -> tuple[Any, int]:
         """The same as the core's array, and how many they are."""
-        watched = self.watched()
+        watched = self.all_watched()
         array: Any = (lib.Watch * max(len(watched), 1))()
         columns = np.frombuffer(array, dtype=np.dtype(lib.Watch))[: len(watched)]
         edges = self._edges(watched)
         columns["row"], columns["side"], columns["tolerance"] = edges.row, edges.side, edges.small - edges.level
         return array, len(watched)
 
-    def crossed(self, dense: Dense, begin: float, end: float) -> tuple[float, list[Watched]] | None:
+    def first_crossing(self, dense: Dense, begin: float, end: float) -> tuple[float, list[Watched]] | None:
         """The first instant in begin..end at which something watched changes, and which; None where nothing does."""
-        watched = self.watched()
+        watched = self.all_watched()
         found = crossing(dense, self._edges(watched), begin, end)
         return None if found is None else (found[0], [watched[k] for k in found[1]])
 
-    def turned(self, t: float, y: Floats, yd: Floats) -> list[Watched]:
+    def turned_relations(self, t: float, y: Floats, yd: Floats) -> list[Watched]:
         """The relations that an instant at which the text jumps leaves on another side."""
-        values, watched = self.observer(t, y, yd), self.watched()
+        values, watched = self.observer(t, y, yd), self.all_watched()
         other = watched.side * values[watched.row] < -self.observer.zeros(watched.row)
         return watched.each(other & (watched.relation >= 0))
 

@@ -40,7 +40,7 @@ def failure(run: Integration, cause: str) -> SolverFailure:
     return SolverFailure(cause, method.t, method.h, unknown, row, smooth=run.work[1])
 
 
-def placed(run: Integration, cause: str) -> SolverFailure:
+def place_failure(run: Integration, cause: str) -> SolverFailure:
     """The failure with the last good point."""
     found = failure(run, cause)
     n, (y, yd) = run.system.form.written, run.method.point()

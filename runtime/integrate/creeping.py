@@ -33,11 +33,11 @@ class Windows:
         self._steps, self._failed = work.steps, work.newton_failures
         self._end = work.steps + self._first + work.steps // 4
 
-    def left(self, steps: int) -> int:
+    def steps_left(self, steps: int) -> int:
         """Steps to the end of the one at hand."""
         return max(self._end - steps, 1)
 
-    def strained(self, work: Statistics) -> bool:
+    def is_strained(self, work: Statistics) -> bool:
         """Whether one has ended in which Newton failed too often."""
         if work.steps < self._end:
             return False
@@ -62,7 +62,7 @@ class Creeping:
         limits = (*(DRAFT if draft else RUN), *([TRIAL] if tried else []))
         self._marks = [_Mark(most, part, _done(work), t) for most, part in limits]
 
-    def left(self, steps: int) -> int:
+    def steps_left(self, steps: int) -> int:
         """Steps to the next look, which no clock decides."""
         return ASKED - steps % ASKED
 

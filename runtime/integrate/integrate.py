@@ -15,9 +15,9 @@ from dataclasses import replace
 
 import numpy as np
 from sysdyn.runtime.condense.condensed import Condensed
-from sysdyn.runtime.condense.condenser import Forms, condensed
+from sysdyn.runtime.condense.condenser import Forms, condense_model
 from sysdyn.runtime.events.plan import Happened
-from sysdyn.runtime.integrate.causes import NEWTON, failure, placed
+from sysdyn.runtime.integrate.causes import NEWTON, failure, place_failure
 from sysdyn.runtime.integrate.creeping import Creeping, Windows
 from sysdyn.runtime.integrate.jumps.corners import Corners, serves
 from sysdyn.runtime.integrate.jumps.crossing import cross
@@ -36,7 +36,7 @@ from sysdyn.runtime.integrate.weights.told import Told
 from sysdyn.runtime.integrate.weights.unknown_roles import Roles, general_rates, roles
 from sysdyn.runtime.model import core_library as lib
 from sysdyn.runtime.model.description import Floats, Ints
-from sysdyn.runtime.model.scales import ceiling, confirmed, group_maxima
+from sysdyn.runtime.model.scales import ceiling, confirm_magnitudes, group_maxima
 from sysdyn.runtime.model.system import LARGE, System
 from sysdyn.runtime.numerics.ordering import Order, net_order_of
 from sysdyn.runtime.start.settled import Settler
@@ -78,7 +78,7 @@ class Integration:
             self._weigh()
         self._spare()
         self.segments = segments(start.t, request.t_end, None if request.fixed_step else request.stops)
-        self.forms = self._condensed()
+        self.forms = self._condense()
         self._linear()
         at = start.t, self.y, self.yd
         self.settlers = Settlers(system, self.forms, request, self.sizes, self.roles, at)
@@ -168,10 +168,10 @@ class Integration:
         scale = kinematic_scale(self.system, self.sizes.magnitude, self.origin.jy, self.origin.jyd)
         if (scale != self.system.kinematic_scale).any():
             self.system.kinematic_scale[:] = scale
-            self.origin.weighted()
+            self.origin.weigh_entries()
             self.sizes = Sizes(self.system, self.start, self.request, self.origin)
 
-    def _condensed(self) -> Forms | None:
+    def _condense(self) -> Forms | None:
         """The forms without what constant sums define; None where all unknowns are integrated."""
         request = self.request
         whole = request.events is not None or request.least_norm or request.fixed_step is not None
@@ -179,7 +179,7 @@ class Integration:
             return None
         if self.system.unknowns > LARGE:
             self.system.put_away(whole=True)  # found again, if it is what is stepped
-        found = condensed(self.system, self.start.t, self.y, self.yd)
+        found = condense_model(self.system, self.start.t, self.y, self.yd)
         if found is not None:
             assert self.origin is not None
             if self.origin.kept is None:
@@ -255,16 +255,16 @@ class Integration:
         """Roles of what is kept; constraints between displacements are left by their rates: no index above 2."""
         jyd = whole.slopes(self.start.t, self.y, self.yd, rate=True)
         jyd = general_rates(whole, self.start.t, self.y, self.yd, jyd)
-        return roles(whole, self.start.t, jyd, min(self.request.index, 2)).kept(kept)
+        return roles(whole, self.start.t, jyd, min(self.request.index, 2)).select(kept)
 
     def last(self) -> tuple[Floats, Floats, Floats]:
         """Y and yd at the end of the last step, the largest |y| met [unknowns]."""
         y, yd = self.method.point()
-        return y, yd, self.sizes.at(y)[0]
+        return y, yd, self.sizes.sizes_at(y)[0]
 
-    def confirmed(self, met: Floats, magnitude: Floats) -> Floats:
+    def confirm_magnitudes(self, met: Floats, magnitude: Floats) -> Floats:
         """Magnitudes as the run confirmed them, by those it met and went by [unknowns]."""
-        return confirmed(self.system, self.request.t_end - self.start.t, met, magnitude)
+        return confirm_magnitudes(self.system, self.request.t_end - self.start.t, met, magnitude)
 
     def _drift(self) -> int | None:
         """Address of what the last step was off the constraints before its method projected it."""
@@ -282,9 +282,9 @@ class Integration:
         method = self.method.contents
         return self.statistics(), self.request.method == "bdf" and method.orders > SMOOTH * method.steps
 
-    def happened(self) -> tuple[Happened, ...]:
+    def past_events(self) -> tuple[Happened, ...]:
         """The events so far."""
-        return self.pieces.happened() if self.pieces is not None else ()
+        return self.pieces.past_events() if self.pieces is not None else ()
 
     def statistics(self) -> Statistics:
         """Counters so far; residuals and Jacobians of the settling at output instants not included."""
@@ -308,7 +308,7 @@ class Integration:
         creeping = Creeping(span, method.t, self.statistics(), draft=request.draft, tried=request.tried)
         windows = Windows(request.unstrained, self.statistics()) if request.unstrained else None
         while True:
-            until = [item.left(method.steps) for item in (creeping, windows, self.exchange) if item is not None]
+            until = [item.steps_left(method.steps) for item in (creeping, windows, self.exchange) if item is not None]
             if request.max_steps is not None:
                 until.append(max(request.max_steps - method.steps, 1))
             before = time.process_time()
@@ -323,12 +323,12 @@ class Integration:
             if self.exchange is not None and state in (0, 3) and self.exchange.due(failed=state == 3):
                 continue
             if state == 3:
-                if lib.CAUSES[method.cause] in NEWTON and self._resolved():
+                if lib.CAUSES[method.cause] in NEWTON and self._resolve_zeros():
                     continue
-                raise placed(self, lib.CAUSES[method.cause])
+                raise place_failure(self, lib.CAUSES[method.cause])
             if request.max_steps is not None and method.steps >= request.max_steps and method.t < request.t_end:
                 raise failure(self, "max_steps")
-            if windows is not None and windows.strained(self.statistics()):
+            if windows is not None and windows.is_strained(self.statistics()):
                 raise failure(self, "strained")
             late = request.max_wall is not None and time.monotonic() - began > request.max_wall
             if late and method.t < request.t_end:
@@ -349,18 +349,18 @@ class Integration:
             if not creeping.goes_on(method.t, self.statistics()):
                 raise failure(self, "crawl")
 
-    def _resolved(self) -> bool:
+    def _resolve_zeros(self) -> bool:
         """Whether a step failed by what round-off leaves of unknowns that are still zero where the terms of their rows
         have grown; then their magnitudes have too, and the method begins anew at the last accepted point.
         """
         if self.system.unknowns > LARGE:
             return False
         y, yd = self.method.point()
-        before = self.sizes.at(y)[1].copy()
+        before = self.sizes.sizes_at(y)[1].copy()
         self.sizes.share(y)
         self.sizes.resolve_by_rows(self.method.contents.t, y, yd, self.roles.state)
         self.sizes.hand_down()
-        if not (0.5 * self.sizes.at(y)[1] > before).any():
+        if not (0.5 * self.sizes.sizes_at(y)[1] > before).any():
             return False
         self.method.start(self.method.contents.t, y, yd)
         return True
@@ -399,7 +399,7 @@ class Integration:
             self.cpu,
             self.settlers.failures,
             self.driver.ledgers,
-            self.happened(),
+            self.past_events(),
             self.driver.run.beyond,
             opening=method.opening if self.request.method in OPENED else 0.0,
             extrema=self.driver.extrema,
@@ -411,8 +411,8 @@ class Integration:
         if spent and self.system.unknowns > LARGE:
             del method
             self._leave_method()
-        met, magnitude = self.sizes.at(last()[0], last=True)
-        magnitude = self.confirmed(met, magnitude)
+        met, magnitude = self.sizes.sizes_at(last()[0], last=True)
+        magnitude = self.confirm_magnitudes(met, magnitude)
         most = None if self.system.unknowns > LARGE else ceiling(self.system, met, magnitude)
         peaks = None if self.system.unknowns > LARGE else met.copy()
         magnitude, met = (group_maxima(self.system, sizes) for sizes in (magnitude, met))

@@ -113,12 +113,12 @@ class Method:
             return lambda: (y, yd)
         condensed, (stays, still) = self._condensed, self._stays
 
-        def expanded() -> tuple[Floats, Floats]:
-            return condensed.expanded(y, stays), condensed.expanded(yd, still, rate=True)
+        def expanded_system() -> tuple[Floats, Floats]:
+            return condensed.expand_point(y, stays), condensed.expand_point(yd, still, rate=True)
 
         if self._n > LARGE:
-            return expanded
-        found = expanded()  # before the numbers of another run are put there
+            return expanded_system
+        found = expanded_system()  # before the numbers of another run are put there
         return lambda: found
 
     def __del__(self) -> None:

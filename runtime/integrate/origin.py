@@ -9,7 +9,7 @@ from sysdyn.runtime.integrate.factors import Factors
 from sysdyn.runtime.integrate.underlying import Accelerations, underlying_form
 from sysdyn.runtime.integrate.weights.unknown_roles import Roles, general_rates, roles, without_rate
 from sysdyn.runtime.model.description import Floats
-from sysdyn.runtime.model.scales import magnitudes, unresolved
+from sysdyn.runtime.model.scales import magnitudes, unresolved_sizes
 from sysdyn.runtime.model.system import LARGE, System
 from sysdyn.runtime.numerics.ordering import net_order_of
 from sysdyn.runtime.start.start import ConsistentState
@@ -82,7 +82,7 @@ class Origin:
         """What round-off leaves open of displacements and flows [unknowns]."""
         known = self._matrix is not None or self.system.unknowns <= LARGE
         jy = self.jy if known else self.system.slopes(self.t, self.y, self.rate, rate=False)
-        return np.where(self.system.are("q", "f"), UNRESOLVED * unresolved(self.system, self.y, jy), 0.0)
+        return np.where(self.system.are("q", "f"), UNRESOLVED * unresolved_sizes(self.system, self.y, jy), 0.0)
 
     def _entries(self) -> tuple[Floats, Floats]:
         if self._matrix is None:
@@ -96,7 +96,7 @@ class Origin:
             self.__dict__.pop("least", None)
             self.__dict__.pop("roles", None)
 
-    def sized(self, t_end: float) -> tuple[Floats, float]:
+    def initial_sizes(self, t_end: float) -> tuple[Floats, float]:
         """Magnitudes of the unknowns and the time scale (s) of the start, of a run to t_end (s)."""
         if self._sized is None or self._sized[0] != t_end:
             order = net_order_of(self.system)
@@ -115,6 +115,6 @@ class Origin:
             self._explicit = solved, without_rate(self.roles, Accelerations(solved).without_rate)
         return self._explicit
 
-    def weighted(self) -> None:
+    def weigh_entries(self) -> None:
         """The entries of the Jacobian anew: its rows q' - f have other factors."""
         self.let_go()

@@ -1,8 +1,9 @@
 """The underlying ordinary differential equation of a model, from its blocks (core/steppers/explicit/underlying.h).
 
 `Underlying` owns the core's structure: the matrix [M A^T; A 0] as entries of dF/dy and dF/dy' of form 0, the rows of
-the constraints in the places of their derivatives.  The equation exists where that matrix is regular (`undetermined` is
-empty): where coordinates without inertia are determined by constraints, and implicit efforts by gammas.
+the constraints in the places of their derivatives.  The equation exists where that matrix is regular
+(`undetermined_unknowns` is empty): where coordinates without inertia are determined by constraints, and implicit
+efforts by gammas.
 """
 
 from __future__ import annotations
@@ -23,11 +24,11 @@ from sysdyn.runtime.model.forms import Planned
 from sysdyn.runtime.model.patterns import Pattern
 from sysdyn.runtime.model.system import System
 from sysdyn.runtime.numerics.equilibrate import sparse_factors
-from sysdyn.runtime.numerics.matching import matched
+from sysdyn.runtime.numerics.matching import match_rows
 from sysdyn.runtime.numerics.ordering import Order, column_order
-from sysdyn.runtime.numerics.rank import CERTAIN, count, decomposed
+from sysdyn.runtime.numerics.rank import CERTAIN, count, singular_decomposition
 from sysdyn.runtime.start.start import ConsistentState
-from sysdyn.runtime.structure.levels import undifferentiated
+from sysdyn.runtime.structure.levels import undifferentiated_families
 from sysdyn.values import dataclass
 
 SMALL = tuning.IN_THE_CORE
@@ -188,24 +189,24 @@ class Accelerations:
         """Entries of the matrix from those of dF/dy, dF/dy'."""
         return np.where(self._from_rate > 0, jyd[self._source], jy[self._source])
 
-    def undetermined(self, jy: Floats, jyd: Floats) -> Sequence[str]:
+    def undetermined_unknowns(self, jy: Floats, jyd: Floats) -> Sequence[str]:
         """Unknowns, or x' for their derivatives, that the rows do not determine at a point; none where they do."""
         number = self.pattern.unknowns
         if number == 0:
             return ()
         if number <= SMALL and _regular(self.pattern, self.values(jy, jyd)):
             return ()
-        alone = _unmatched(self.pattern) if number > DENSE else np.zeros(0)
+        alone = _unmatched_unknowns(self.pattern) if number > DENSE else np.zeros(0)
         if alone.any():
             return self._largest(alone)
-        matrix = _balanced(self.pattern, self.values(jy, jyd))
+        matrix = _equilibrated_entries(self.pattern, self.values(jy, jyd))
         if number > DENSE:
             return self._largest(_sparse_null(self.pattern, matrix))
         full = np.zeros((number, number))
         full[self.pattern.row, self.pattern.columns_of()] = matrix
         if not np.isfinite(full).all():
             return ()
-        _, sigma, vectors = decomposed(full)
+        _, sigma, vectors = singular_decomposition(full)
         null = vectors[count(sigma, CERTAIN) :]
         return self._largest(np.abs(null).max(axis=0) if null.size else np.zeros(number))
 
@@ -325,7 +326,7 @@ def underlying_form(system: System, state: ConsistentState) -> tuple[System, Seq
     That system itself; where coordinates without inertia are in the way, one in which constraints stand as they are.
     """
     missing = obstacle(system, state)
-    kept = system.once("undifferentiated", lambda: undifferentiated(system)) if missing else None
+    kept = system.once("undifferentiated", lambda: undifferentiated_families(system)) if missing else None
     if kept:
         other = system.another("0/" + ",".join(map(str, kept)))
         if not obstacle(other, state):
@@ -346,7 +347,7 @@ def obstacle(system: System, state: ConsistentState) -> Sequence[str]:
     """What keeps a model from having an underlying equation: unknowns not determined at a state.  system: form "0"."""
     y, yd = state.for_form(system)
     jy, jyd = system.jacobian(state.t, y, yd)
-    return Accelerations(system).undetermined(jy, jyd)
+    return Accelerations(system).undetermined_unknowns(jy, jyd)
 
 
 def _regular(pattern: Pattern, values: Floats) -> bool:
@@ -355,19 +356,19 @@ def _regular(pattern: Pattern, values: Floats) -> bool:
     return int(lib.core.sd_regular(pattern.unknowns, *arrays, CERTAIN)) != 0
 
 
-def _balanced(pattern: Pattern, values: Floats) -> Floats:
+def _equilibrated_entries(pattern: Pattern, values: Floats) -> Floats:
     """The entries of the equilibrated matrix."""
     columns = pattern.columns_of()
     row, column = sparse_factors(pattern.row, columns, np.abs(values), (pattern.rows, pattern.unknowns))
     return values * row[pattern.row] * column[columns]
 
 
-def _unmatched(pattern: Pattern) -> NDArray[np.float64]:
+def _unmatched_unknowns(pattern: Pattern) -> NDArray[np.float64]:
     """1 for unknowns that no row is left for, whatever the values (a maximum matching of rows and columns), else 0.
 
     Round-off makes pivots of what is singular by structure: a line of 20000 sections passes for regular by its values.
     """
-    return np.asarray(matched(pattern) < 0, dtype=np.float64)
+    return np.asarray(match_rows(pattern) < 0, dtype=np.float64)
 
 
 def _sparse_null(pattern: Pattern, values: Floats) -> NDArray[np.float64]:

@@ -86,7 +86,7 @@ class ContactRest:
         assert self._last is not None
         kept, state = self._last, self.contacts.state()
         if not all(self.contacts.active[k] for k in self._frictions):  # at its bound, and at rest: it sticks
-            loaded = self._loaded(kept.state.y, kept.state.yd)
+            loaded = self._load_frictions(kept.state.y, kept.state.yd)
             self._stick()
             sticking = self._settle(self.t, loaded, kept.state.yd, loaded)
             if sticking is not None and self.contacts.fits(self.t, loaded, sticking):
@@ -96,7 +96,7 @@ class ContactRest:
         words = {c.name: self.contacts.word(k) for k, c in enumerate(self.contacts.contacts) if c.kind != "follows"}
         return replace(kept, standing=(self.contacts.p.copy(), switches.active.copy()), holding=words)
 
-    def _loaded(self, y: Floats, yd: Floats) -> Floats:
+    def _load_frictions(self, y: Floats, yd: Floats) -> Floats:
         """A point at which frictions slip, with what they give as what they would take if they stuck."""
         contacts, y = self.contacts, y.copy()
         values = contacts.observer(self.t, y, yd)
@@ -115,11 +115,11 @@ class ContactRest:
         """Nothing is certain: the contacts decide where a point leads."""
         return False
 
-    def apart(self, one: Rest, other: Rest) -> bool:
+    def is_apart(self, one: Rest, other: Rest) -> bool:
         """Whether two states differ by more than what the first leaves open."""
         one.stand(self.system)
         self.contacts.take(self.system.description.switches.active)
-        return self._resting().apart(one, other)
+        return self._resting().is_apart(one, other)
 
 
 class SampledRest:
@@ -127,7 +127,7 @@ class SampledRest:
 
     def __init__(self, equations: Equations, system: System, sampled: tuple[Sampled, ...]) -> None:
         self.equations, self.system, self.sampled = equations, system, sampled
-        self.first, self.problem, self.apart = equations.first, equations.problem, equations.apart
+        self.first, self.problem, self.is_apart = equations.first, equations.problem, equations.is_apart
         self.alike = equations.alike
         self.observer = Observer(system)
         self.changes: dict[str, None] = {}

@@ -19,7 +19,7 @@ from sysdyn.runtime.linear import precise
 from sysdyn.runtime.linear.precise import Decomposed
 from sysdyn.runtime.model.description import Floats
 from sysdyn.runtime.numerics.equilibrate import factors
-from sysdyn.runtime.numerics.rank import count, decomposed, singular_values
+from sysdyn.runtime.numerics.rank import count, singular_decomposition, singular_values
 from sysdyn.values import dataclass
 
 Complexes = NDArray[np.complex128]
@@ -63,7 +63,7 @@ class Transfer:
     improper: tuple[float, float]
 
 
-def balanced(a: Floats) -> tuple[Floats, Floats]:
+def balance_matrix(a: Floats) -> tuple[Floats, Floats]:
     """D^-1 a D with rows and columns of like size, and the diagonal of D (powers of two)."""
     from scipy.linalg import matrix_balance
 
@@ -80,22 +80,22 @@ def modes(a: Floats, precisely: Decomposed | None = None) -> tuple[Mode, ...]:
     if precisely is not None:
         share = np.abs(precisely.right * precisely.left.T)
         total = share.sum(axis=0)
-        return _sorted(precisely.values, share / np.where(total > 0.0, total, 1.0), precisely.right)
-    inner, scale = balanced(a)
+        return _sort_modes(precisely.values, share / np.where(total > 0.0, total, 1.0), precisely.right)
+    inner, scale = balance_matrix(a)
     values, right = np.linalg.eig(inner)
-    values = _resolved(_sharpened(values, inner), inner)
+    values = _resolve_eigenvalues(_sharpen_small(values, inner), inner)
     share = np.abs(right) ** 2
     if np.linalg.cond(right) < DEFECTIVE:
         share = np.abs(right * np.linalg.inv(right).T)
-    return _sorted(values, share / share.sum(axis=0), scale[:, None] * right)
+    return _sort_modes(values, share / share.sum(axis=0), scale[:, None] * right)
 
 
-def _sorted(values: Complexes, share: Floats, right: Complexes) -> tuple[Mode, ...]:
+def _sort_modes(values: Complexes, share: Floats, right: Complexes) -> tuple[Mode, ...]:
     order = sorted(range(values.size), key=lambda k: (round(float(values[k].real), 12), float(values[k].imag)))
     return tuple(_mode(complex(values[k]), share[:, k], right[:, k]) for k in order)
 
 
-def _sharpened(values: Complexes, a: Floats) -> Complexes:
+def _sharpen_small(values: Complexes, a: Floats) -> Complexes:
     """Eigenvalues whose round-off is that of the largest: small ones from the inverse, where that is to be trusted."""
     size = np.abs(values)
     if values.size < 2 or not size.max() > APART * size.min() or not regular(a):
@@ -118,7 +118,7 @@ def _by_size(values: Complexes) -> NDArray[np.intp]:
     return np.lexsort((np.sign(np.round(values.imag / size, 9)), np.round(np.log(size), 6)))
 
 
-def _resolved(values: Complexes, a: Floats) -> Complexes:
+def _resolve_eigenvalues(values: Complexes, a: Floats) -> Complexes:
     """Eigenvalues of a balanced matrix, zero where they are below what its round-off leaves open."""
     least = 4.0 * a.shape[0] * np.finfo(float).eps * float(np.abs(a).sum(axis=0).max(initial=0.0))
     return np.where(np.abs(values) > least, values, 0.0)
@@ -131,7 +131,7 @@ def _mode(value: complex, share: Floats, right: Complexes) -> Mode:
     return Mode(value, size, 0.0 - value.real / size if size > 0.0 else None, share, shape)
 
 
-def stored(modes_: Sequence[Mode], content: Floats, conjugate: Floats) -> Floats:
+def store_shares(modes_: Sequence[Mode], content: Floats, conjugate: Floats) -> Floats:
     """Shares [modes, stores] of each mode's energy: |Re(content* conjugate)| of q, e or p, f [stores, states], normed.
 
     Of an oscillation twice the mean over a period, of a decay the energy itself, relative to the whole.
@@ -146,15 +146,15 @@ def transfer(
     a: Floats, b: Floats, c: Floats, d: float, place: tuple[int, int], improper: tuple[float, float]
 ) -> Transfer:
     """One output by one input; b, c [states]; place: output, input; improper: slopes by the input's rates."""
-    inner, scale = balanced(a)
+    inner, scale = balance_matrix(a)
     first = _first_markov(inner, b / scale, c * scale)
-    inner, b, c = reached(inner, b / scale, c * scale)
-    inner, c, b = reached(inner.T, c, b)
+    inner, b, c = reachable_part(inner, b / scale, c * scale)
+    inner, c, b = reachable_part(inner.T, c, b)
     inner = inner.T
     zeros, gain = _zeros(inner, b, c, d, first)
     zeros = _at_origin(inner, b, c, d, zeros)
     poles = np.linalg.eigvals(inner).astype(complex) if inner.size else np.zeros(0, complex)
-    poles = _resolved(_sharpened(poles, inner), inner)
+    poles = _resolve_eigenvalues(_sharpen_small(poles, inner), inner)
     poles, zeros = (values[np.lexsort((values.imag, values.real))] for values in (poles, zeros))
     return Transfer(*place, poles, zeros, gain, _static(poles, zeros, gain), improper)
 
@@ -170,16 +170,16 @@ def wide_transfer(
     zeros2, poles2, _ = precise.rational(*other)
     fastest = float(np.abs(poles).max(initial=0.0))
     if zeros.size == zeros2.size:
-        loose = precise.apart(zeros, zeros2) > precise.DETERMINED
+        loose = precise.relative_distances(zeros, zeros2) > precise.DETERMINED
         far = loose & (np.abs(zeros) > FAR * fastest)
         zeros, gain = np.where(loose & ~far, 0.0, zeros)[~far], gain * float(np.prod(-zeros[far]).real)
     if poles.size == poles2.size:
-        poles = np.where(precise.apart(poles, poles2) > precise.DETERMINED, 0.0, poles)
+        poles = np.where(precise.relative_distances(poles, poles2) > precise.DETERMINED, 0.0, poles)
     poles, zeros = (values[np.lexsort((values.imag, values.real))] for values in (poles, zeros))
     return Transfer(*place, poles, zeros, gain, _static(poles, zeros, gain), improper)
 
 
-def reached(a: Floats, b: Floats, c: Floats) -> tuple[Floats, Floats, Floats]:
+def reachable_part(a: Floats, b: Floats, c: Floats) -> tuple[Floats, Floats, Floats]:
     """a, b, c on the states that b reaches (Arnoldi's process, orthogonalised twice)."""
     size = float(np.linalg.norm(a, 2)) if a.size else 0.0
     basis: list[Floats] = []
@@ -200,7 +200,7 @@ def reached(a: Floats, b: Floats, c: Floats) -> tuple[Floats, Floats, Floats]:
 def _first_markov(a: Floats, b: Floats, c: Floats) -> tuple[int, float] | None:
     """r, c a^r b: the first Markov parameter that is not zero; None where nothing passes.
 
-    In the coordinates of the model, where zeros are zeros: those of `reached` mix them with round-off.
+    In the coordinates of the model, where zeros are zeros: those of `reachable_part` mix them with round-off.
     """
     row, size = c, np.abs(c)
     for r in range(b.size):
@@ -229,7 +229,7 @@ def _zeros(a: Floats, b: Floats, c: Floats, d: float, first: tuple[int, float] |
 def _kept_at_zero(a: Floats, b: Floats, kept: Floats, markov: float) -> Complexes:
     """Eigenvalues of the motion that keeps the output at zero; kept [r, n]: c, c a, ..., c a^(r-1)."""
     size = np.linalg.norm(kept, axis=1)
-    _, _, vt = decomposed(kept / size[:, None])
+    _, _, vt = singular_decomposition(kept / size[:, None])
     basis = vt[len(kept) :].T
     if not basis.size:
         return np.zeros(0, complex)

@@ -16,10 +16,10 @@ import numpy as np
 from numpy.typing import NDArray
 from sysdyn.runtime import tuning
 from sysdyn.runtime.linear import precise
-from sysdyn.runtime.linear.tangent import NoLinearisation, Reduced, Wide, lost
+from sysdyn.runtime.linear.tangent import NoLinearisation, Reduced, Wide, describe_lost
 from sysdyn.runtime.model.description import Floats
 from sysdyn.runtime.numerics.equilibrate import factors
-from sysdyn.runtime.numerics.rank import CERTAIN, TOLERANCE, count, decomposed, null_space, singular_values
+from sysdyn.runtime.numerics.rank import CERTAIN, TOLERANCE, count, null_space, singular_decomposition, singular_values
 from sysdyn.values import dataclass
 
 CLOCKS = (*range(0, 15, 3), *range(-3, -9, -3))
@@ -39,7 +39,7 @@ class _Ranks:
     def __init__(self) -> None:
         self.gap = 16.0
 
-    def of(self, sigma: Floats) -> int:
+    def rank_of(self, sigma: Floats) -> int:
         """How many singular values of a matrix of size one are not zero."""
         rank = int((sigma > TOLERANCE).sum())
         above = sigma[rank - 1] if rank else 1.0
@@ -65,15 +65,15 @@ def _image(matrix: Floats, ranks: _Ranks) -> Floats:
     """Orthonormal columns that span the columns of a matrix."""
     if not matrix.size:
         return np.zeros((matrix.shape[0], 0))
-    u, sigma, _ = decomposed(matrix)
-    return u[:, : ranks.of(sigma)]
+    u, sigma, _ = singular_decomposition(matrix)
+    return u[:, : ranks.rank_of(sigma)]
 
 
 def _preimage(matrix: Floats, image: Floats, ranks: _Ranks) -> Floats:
     """Orthonormal columns that span what a matrix maps into the span of orthonormal columns."""
     outside = matrix - image @ (image.T @ matrix)
-    _, sigma, vt = decomposed(outside)
-    return np.asarray(vt[ranks.of(sigma) :].T)
+    _, sigma, vt = singular_decomposition(outside)
+    return np.asarray(vt[ranks.rank_of(sigma) :].T)
 
 
 def _sequence(into: Floats, by: Floats, space: Floats, ranks: _Ranks) -> Floats:
@@ -117,7 +117,7 @@ def _regular(matrix: Floats) -> bool:
     return not sigma.size or bool(count(sigma) == sigma.size and sigma[0] > CERTAIN)
 
 
-def parted(
+def reduce_pencil(
     matrices: tuple[Floats, ...], chosen: Choice, spaces: tuple[Floats, Floats, Floats], names: tuple[str, ...]
 ) -> Reduced:
     """The reduction; matrices: E, A, B, C, Cd, D of dv = C dy + Cd dy' + D du; chosen: states among the unknowns;
@@ -146,15 +146,15 @@ def parted(
 def _product(*factors: Floats) -> Floats:
     """Of matrices, without entries that are round-off of what cancels in them."""
     size = np.linalg.multi_dot([np.abs(part) for part in factors])
-    return np.asarray(_cleared(np.linalg.multi_dot(factors), size, 1e-13))
+    return np.asarray(_clear_round_off(np.linalg.multi_dot(factors), size, 1e-13))
 
 
-def _cleared(found: Any, size: Any, noise: float) -> Any:
+def _clear_round_off(found: Any, size: Any, noise: float) -> Any:
     """Zero where an entry is round-off beside the magnitudes that it is made of."""
     return np.where(np.abs(found) > noise * size, found, 0 * found)
 
 
-def _turned(spaces: tuple[Floats, Floats, Floats]) -> tuple[Floats, Floats, Floats]:
+def _rotate_bases(spaces: tuple[Floats, Floats, Floats]) -> tuple[Floats, Floats, Floats]:
     """The same spaces by other columns: what is exact of them stays, round-off on the way differs."""
     random = np.random.default_rng(5)
     v, w = (part @ np.linalg.qr(random.standard_normal(2 * part.shape[1:]))[0] for part in spaces[:2])
@@ -168,17 +168,17 @@ def surely_parted(
 
     Raises NoLinearisation where they are lost for good.
     """
-    small = parted(matrices, chosen, spaces, names)
+    small = reduce_pencil(matrices, chosen, spaces, names)
     e, a, *rest = matrices
     other = precise.shaken(e), precise.shaken(a)
-    again = parted((*other, *rest), chosen, _turned(spaces), names)
+    again = reduce_pencil((*other, *rest), chosen, _rotate_bases(spaces), names)
     values, others = (precise.eigenvalues(part.a) for part in (small, again))
     if precise.steady(values, others):
         return small
-    found = _decided(matrices, (*other, *rest), chosen)
+    found = _reduce_precisely(matrices, (*other, *rest), chosen)
     if found is not None:
         return replace(found, names=names)
-    precise.refuse_lost(values, others, lost)
+    precise.refuse_lost(values, others, describe_lost)
     return small
 
 
@@ -195,10 +195,14 @@ def widely_parted(matrices: tuple[Floats, ...], groups: tuple[Choice, ...], stat
         spanned = powers[2] @ precise.wide(np.random.default_rng(1).standard_normal((powers[2].shape[0], states)))
         chosen = precise.independent(spanned, groups)
     e, a, *rest = matrices
-    return _decided(matrices, (precise.shaken(e), precise.shaken(a), *rest), chosen) if chosen.size == states else None
+    return (
+        _reduce_precisely(matrices, (precise.shaken(e), precise.shaken(a), *rest), chosen)
+        if chosen.size == states
+        else None
+    )
 
 
-def _decided(matrices: tuple[Floats, ...], other: tuple[Floats, ...], chosen: Choice) -> Reduced | None:
+def _reduce_precisely(matrices: tuple[Floats, ...], other: tuple[Floats, ...], chosen: Choice) -> Reduced | None:
     """The reduction in many digits, where it can be taken; other: the matrices with their round-off changed."""
     if not 0 < chosen.size <= precise.MOST or matrices[0].shape[0] > WIDEST:
         return None
@@ -206,7 +210,7 @@ def _decided(matrices: tuple[Floats, ...], other: tuple[Floats, ...], chosen: Ch
         found, beside = (_parted_widely(part, chosen) for part in (matrices, other))
         if found is None or beside is None:
             return None
-        seen = precise.settled(precise.decompose(found[0]), precise.decompose(beside[0]).values, lost)
+        seen = precise.settle_modes(precise.decompose(found[0]), precise.decompose(beside[0]).values, describe_lost)
         a, b, c, d, d1, d2 = (precise.narrow(part) for part in found)
         wide = Wide(found[0], found[1], found[2], found[3], Wide(beside[0], beside[1], beside[2], beside[3]))
         return Reduced(a, b, c, d, d1, d2, chosen, (), wide, seen)
@@ -217,7 +221,7 @@ def _powers(matrices: tuple[Floats, ...]) -> tuple[precise.Wide, precise.Wide, p
     e, a, b = (precise.wide(part) for part in matrices[:3])
     column = _units(matrices)
     e, a = e * column, a * column
-    if (both := precise.solved(a - SHIFT * _size(matrices) * e, np.hstack([e, b]))) is None:
+    if (both := precise.solve(a - SHIFT * _size(matrices) * e, np.hstack([e, b]))) is None:
         return None
     m, nu = both[:, : e.shape[0]], both[:, e.shape[0] :]
     power = m
@@ -250,12 +254,12 @@ def _parted_widely(matrices: tuple[Floats, ...], chosen: Choice) -> tuple[precis
     spanned = power @ precise.wide(random.standard_normal((n, states)))
     seen = precise.wide(random.standard_normal((states, n))) @ power
     own = precise.wide(np.eye(states))
-    if (turned := precise.solved((spanned * column[:, None])[chosen].T, spanned.T)) is None:
+    if (turned := precise.solve((spanned * column[:, None])[chosen].T, spanned.T)) is None:
         return None
     x = turned.T
-    if (left := precise.solved(seen @ x, seen)) is None:
+    if (left := precise.solve(seen @ x, seen)) is None:
         return None
-    if (back := precise.solved(left @ m @ x, np.hstack([own, left @ nu]))) is None:
+    if (back := precise.solve(left @ m @ x, np.hstack([own, left @ nu]))) is None:
         return None
     own, b1 = back[:, :states] + shift * own, back[:, states:]
     still = precise.wide(np.eye(n)) - x @ left
@@ -268,13 +272,13 @@ def _parted_widely(matrices: tuple[Floats, ...], chosen: Choice) -> tuple[precis
     # magnitudes of what cancels: what is zero but for round-off differentiates no input
     of_still = np.abs(precise.wide(np.eye(n))) + np.abs(x) @ np.abs(left)
     sizes = [np.abs(inverse) @ of_still @ np.abs(nu)]
-    follow = [_cleared(-(inverse @ still @ nu), sizes[0], precise.NOTHING)]
+    follow = [_clear_round_off(-(inverse @ still @ nu), sizes[0], precise.NOTHING)]
     for _ in range(2):
         sizes.append(np.abs(inverse) @ of_still @ np.abs(m) @ sizes[-1])
-        follow.append(_cleared(inverse @ nilpotent @ follow[-1], sizes[-1], precise.NOTHING))
+        follow.append(_clear_round_off(inverse @ nilpotent @ follow[-1], sizes[-1], precise.NOTHING))
     d0 = d + c @ follow[0] + cd @ x @ b1
     d1, d2 = (
-        _cleared(
+        _clear_round_off(
             c @ follow[k] + cd @ follow[k - 1],
             np.abs(c) @ sizes[k] + np.abs(cd) @ sizes[k - 1],
             precise.NOTHING,

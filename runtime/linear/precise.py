@@ -79,15 +79,15 @@ def narrow(matrix: Wide) -> Floats:
     return np.asarray(matrix.astype(np.float64))
 
 
-def eliminated(matrix: Floats, aim: Wide) -> Wide | None:
+def eliminate_consistent(matrix: Floats, aim: Wide) -> Wide | None:
     """X [n, k] of consistent equations matrix [m, n] X = aim [m, k]; None where they leave one open."""
     rows = wide(matrix)
     size = np.abs(matrix).max(axis=1, initial=0.0)
     used = size > 0.0
-    return _eliminated(np.hstack([rows, aim])[used] / wide(size[used])[:, None], matrix.shape[1])
+    return _eliminate(np.hstack([rows, aim])[used] / wide(size[used])[:, None], matrix.shape[1])
 
 
-def _eliminated(full: Wide, n: int) -> Wide | None:
+def _eliminate(full: Wide, n: int) -> Wide | None:
     """Gauss's elimination of [m, n + k]."""
     for k in range(n):
         place = k + int(np.argmax(np.abs(full[k:, k]))) if full.shape[0] > k else k
@@ -102,12 +102,12 @@ def _eliminated(full: Wide, n: int) -> Wide | None:
     return np.asarray(found)
 
 
-def solved(matrix: Wide, aim: Wide) -> Wide | None:
+def solve(matrix: Wide, aim: Wide) -> Wide | None:
     """X [n, k] of matrix [n, n] X = aim [n, k]; None where the matrix is singular."""
     size = [max((abs(x) for x in row), default=0) for row in matrix]
     if not all(size):
         return None
-    return _eliminated(np.hstack([matrix, aim]) / np.array(size, dtype=object)[:, None], matrix.shape[1])
+    return _eliminate(np.hstack([matrix, aim]) / np.array(size, dtype=object)[:, None], matrix.shape[1])
 
 
 def free(
@@ -216,7 +216,7 @@ def decompose(matrix: Wide) -> Decomposed:
             values_, vectors = np.linalg.eig(narrow(matrix))
             return Decomposed(values_.astype(complex), vectors.astype(complex), np.linalg.pinv(vectors).astype(complex))
         largest = max((abs(x) for x in matrix.ravel()), default=mpmath.mpf(0))
-        values = [_rounded(mpmath.mpc(v)) if abs(v) > ZERO * largest else 0j for v in found]
+        values = [_round_eigenvalue(mpmath.mpc(v)) if abs(v) > ZERO * largest else 0j for v in found]
         return Decomposed(
             np.array(values, dtype=np.complex128),
             np.array([complex(x) for x in right]).reshape(right.rows, right.cols),
@@ -224,13 +224,13 @@ def decompose(matrix: Wide) -> Decomposed:
         )
 
 
-def _rounded(value: Any) -> complex:
+def _round_eigenvalue(value: Any) -> complex:
     """An eigenvalue in double precision, a part that is round-off of the other zero."""
     least = ZERO * abs(value)
     return complex(*(part if abs(part) > least else 0.0 for part in (value.real, value.imag)))
 
 
-def apart(one: Values, other: Values) -> NDArray[np.float64]:
+def relative_distances(one: Values, other: Values) -> NDArray[np.float64]:
     """Relative distance of each value [n] to its partner in another set of as many, nearest first."""
     left = list(range(other.size))
     found = np.zeros(one.size)
@@ -244,21 +244,25 @@ def apart(one: Values, other: Values) -> NDArray[np.float64]:
 
 def steady(values: Values, again: Values) -> bool:
     """Whether eigenvalues in double precision are not lost beside each other."""
-    return values.size == again.size and bool((apart(values, again) <= STEADY).all()) and bool((values != 0).all())
+    return (
+        values.size == again.size
+        and bool((relative_distances(values, again) <= STEADY).all())
+        and bool((values != 0).all())
+    )
 
 
 def refuse_lost(values: Values, again: Values, refuse: Callable[[complex], Exception]) -> None:
     """Raises refuse(value) of an eigenvalue in double precision that moves with round-off and is none."""
-    away = apart(values, again) if values.size == again.size else np.ones(values.size)
+    away = relative_distances(values, again) if values.size == again.size else np.ones(values.size)
     least = 1e-10 * float(np.abs(values).max(initial=0.0))
     slow = np.flatnonzero((away > LOST) & (np.abs(values) > least) & (np.abs(values) < CROWDED * least))
     if slow.size:
         raise refuse(complex(values[slow[0]]))
 
 
-def settled(found: Decomposed, again: Values, refuse: Callable[[complex], Exception]) -> Decomposed:
+def settle_modes(found: Decomposed, again: Values, refuse: Callable[[complex], Exception]) -> Decomposed:
     """The modes, zero where an eigenvalue is round-off of the largest; raises refuse(value) of one that is neither."""
-    moved = np.flatnonzero(apart(found.values, again) > DETERMINED)
+    moved = np.flatnonzero(relative_distances(found.values, again) > DETERMINED)
     values = found.values.copy()
     least = ROUND_OFF ** (1.0 / max(moved.size, 1)) * float(np.abs(values).max(initial=0.0))
     for k in moved:

@@ -59,7 +59,7 @@ class Margins:
     w_gain: float | None
 
 
-def at(transfer: Transfer, s: Complexes) -> Complexes:
+def at_frequencies(transfer: Transfer, s: Complexes) -> Complexes:
     """G at complex frequencies [k]; the product is taken pair by pair, so that it does not overflow."""
     value = np.full(s.shape, complex(transfer.gain))
     zeros, poles = list(transfer.zeros), list(transfer.poles)
@@ -90,7 +90,7 @@ def frequencies(transfer: Transfer, low: float, high: float, points: int = POINT
     found = np.unique([*np.geomspace(low, high, points), *corners, *(w for w in near if low < w < high)])
     on = [abs(p.imag) for p in transfer.poles if p.real == 0.0]
     w = np.array([x for x in found if x not in on])
-    return Frequencies(w, at(transfer, 1j * w))
+    return Frequencies(w, at_frequencies(transfer, 1j * w))
 
 
 def margins(transfer: Transfer, low: float, high: float) -> Margins:
@@ -105,7 +105,7 @@ def margins(transfer: Transfer, low: float, high: float) -> Margins:
         return [float(brentq(function, found.w[k], found.w[k + 1], xtol=1e-300, rtol=1e-13)) for k in places]
 
     def one(w: float) -> complex:
-        return complex(at(transfer, np.array([1j * w]))[0])
+        return complex(at_frequencies(transfer, np.array([1j * w]))[0])
 
     real = [w for w in roots(g.imag, lambda w: one(w).imag) if one(w).real < 0.0 and np.isfinite(one(w))]
     even = roots(np.abs(g) - 1.0, lambda w: abs(one(w)) - 1.0)

@@ -202,7 +202,7 @@ class Resting:
         best = solve(problem, guess)
         if not best.residual < MET:
             return None
-        y = self._turned(self._clean(best.x, problem))
+        y = self._wrap_angles(self._clean(best.x, problem))
         again = self.problem(y)  # in magnitudes of its own: what is near zero in the guess's may be large in these
         own = solve(again, y)
         if not own.residual < MET:
@@ -218,7 +218,7 @@ class Resting:
         free = tuple(self.system.name(int(k)) for k in np.flatnonzero(open_))
         return Rest(state, own.residual, free, open_, self.along.shape[1])
 
-    def _met(self, y: Floats) -> bool:
+    def _is_rest(self, y: Floats) -> bool:
         """Whether y is a state of rest, but for what is near zero in its magnitude."""
         problem = self.problem(y)
         found = solve(replace(problem, guess=y), y, 1)
@@ -247,24 +247,24 @@ class Resting:
         noise = np.maximum(NEAR * group_maximum(self.system, problem.scale), NOISE * self._alike(y))
         clean = np.where(np.abs(y) > noise, y, 0.0)
         tried = np.where(self.still, 0.0, clean), clean
-        return next((z for z in tried if (z != y).any() and self._met(z)), y)
+        return next((z for z in tried if (z != y).any() and self._is_rest(z)), y)
 
     def _back(self, y: Floats, problem: Problem, null: Floats, open_: Mask, near: Floats) -> Floats:
         """What the rows leave open as it is in `near`; open_: which of what has a magnitude that is."""
         if self.n > DENSE:  # what nothing depends on is known without
             back = np.where(self.loose, near, y)
-            return back if (back != y).any() and self._met(back) else y
+            return back if (back != y).any() and self._is_rest(back) else y
         if not open_.any():
             return y
         away = (y - near) / problem.scale
         moves = open_ | np.isin(self.system.kinds[: self.n], ("kappa", "mu"))
         back = np.where(moves, y - problem.scale * (null @ least_squares(null, away)), y)
-        if self._met(back):
+        if self._is_rest(back):
             return back
         found = solve(self.problem(back), back)  # along what bends, or from where its rows hold by round-off alone
         return found.x if found.residual < MET else y
 
-    def _turned(self, y: Floats) -> Floats:
+    def _wrap_angles(self, y: Floats) -> Floats:
         """Angles in -pi..pi where the rows cannot tell whole turns; -pi but for round-off is pi."""
         turned = np.where(self.turns, np.pi + SAME - np.mod(np.pi + SAME - y, 2.0 * np.pi), y)
         near = solve(replace(self.problem(turned), guess=turned), turned, 3)
@@ -298,7 +298,7 @@ class Resting:
         miss = np.abs(self.residual(point) - tangent) <= STRAIGHT * (terms + np.abs(tangent))
         return bool(miss[self.use if not self.along.size else problem.use].all())
 
-    def apart(self, one: Rest, other: Rest) -> bool:
+    def is_apart(self, one: Rest, other: Rest) -> bool:
         """Whether two states differ by more than what the first leaves open, and no states of rest lie between them."""
         problem = self.problem(one.state.y)
         told = ~np.isin(self.system.kinds[: self.n], ("kappa", "mu")) & ~self.loose
@@ -354,7 +354,7 @@ class Equations(Protocol):
     def alike(self, point: Floats) -> bool:
         """Whether Newton's method leads from a point to where it led from the first guess, for certain."""
 
-    def apart(self, one: Rest, other: Rest) -> bool:
+    def is_apart(self, one: Rest, other: Rest) -> bool:
         """Whether two states differ by more than what the first leaves open."""
 
 
@@ -382,7 +382,7 @@ def rests(
         resting.share = 1.0 if k < SOUGHT and not kept else SHARE
         found = resting.found(point)
         begun = begun or (k == 0 and found is not None)
-        if found is not None and all(resting.apart(other, found) for other in kept):
+        if found is not None and all(resting.is_apart(other, found) for other in kept):
             kept.append(found)
             mirrored.append(-found.state.y)
             # what is left open says nothing of how far others lie, and would wander off

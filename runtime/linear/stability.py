@@ -14,11 +14,11 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 from sysdyn.runtime import tuning
-from sysdyn.runtime.linear.modes import Mode, balanced, modes
+from sysdyn.runtime.linear.modes import Mode, balance_matrix, modes
 from sysdyn.runtime.linear.tangent import Reduced
 from sysdyn.runtime.model.description import Floats
 from sysdyn.runtime.model.system import System
-from sysdyn.runtime.numerics.equilibrate import equilibrated
+from sysdyn.runtime.numerics.equilibrate import equilibrate
 from sysdyn.runtime.numerics.rank import null_space
 from sysdyn.runtime.start.start import ConsistentState
 from sysdyn.values import dataclass
@@ -55,7 +55,7 @@ def verdict(small: Reduced, loose: NDArray[np.bool_], energy: Energy | None, tog
     displacements move without changing anything: so many eigenvalues at zero say nothing.
     """
     felt = np.flatnonzero((small.places >= 0) & ~loose[small.places])
-    values = np.linalg.eigvals(balanced(small.a[np.ix_(felt, felt)])[0]) if felt.size else np.zeros(0)
+    values = np.linalg.eigvals(balance_matrix(small.a[np.ix_(felt, felt)])[0]) if felt.size else np.zeros(0)
     near = STILL * float(np.abs(values).max(initial=0.0))
     values = values[np.argsort(np.abs(values))]
     values = values[min(together, int((np.abs(values) <= near).sum())) :]
@@ -86,7 +86,7 @@ def energy_at(system: System, state: ConsistentState) -> Energy | None:
     stiff = np.where(places >= 0, full[np.ix_(balances, np.maximum(places, 0))], 0.0)
     loss = full[np.ix_(balances, flows)]
     bound = _bound(settled, full, flows, places)
-    free = null_space(equilibrated(bound)[0]) if bound.size else np.eye(flows.size)
+    free = null_space(equilibrate(bound)[0]) if bound.size else np.eye(flows.size)
     stiff, loss = (free.T @ part @ free for part in (stiff, loss))
     if not stiff.size:
         return None

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from sysdyn.runtime.model.description import Floats
 from sysdyn.runtime.model.scales import group_maximum
 from sysdyn.runtime.model.system import System
-from sysdyn.runtime.numerics.rank import CERTAIN, decomposed, singular_values
+from sysdyn.runtime.numerics.rank import CERTAIN, singular_decomposition, singular_values
 from sysdyn.runtime.start.start import ConsistentState
 
 Mask = NDArray[np.bool_]
@@ -72,7 +72,7 @@ def unseen(rows: Floats) -> Floats:
     """Directions that some rows of orthonormal columns do not see."""
     if not rows.size:
         return np.eye(rows.shape[1])
-    _, sigma, vt = decomposed(rows)
+    _, sigma, vt = singular_decomposition(rows)
     return np.asarray(vt[int((sigma > CERTAIN).sum()) :].T)
 
 

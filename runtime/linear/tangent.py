@@ -33,8 +33,8 @@ from sysdyn.runtime.numerics.rank import (
     CERTAIN,
     TOLERANCE,
     count,
-    decomposed,
     least_squares,
+    singular_decomposition,
     singular_values,
     sure_complement,
     sure_solver,
@@ -184,11 +184,11 @@ def _null_space(matrix: Floats) -> Floats:
     sure = sure_complement(matrix, CERTAIN) if matrix.shape[0] > FEW else None
     if sure is not None:
         return sure
-    _, sigma, vt = decomposed(matrix)
+    _, sigma, vt = singular_decomposition(matrix)
     return np.asarray(vt[count(sigma, CERTAIN) :].T)
 
 
-def reduced(given: Given) -> Reduced:
+def reduce(given: Given) -> Reduced:
     """The reduction.  Raises NoLinearisation."""
     rows, system, loose = given.rows, given.system, given.loose
     starter, n = rows.starter, system.form.written
@@ -203,17 +203,20 @@ def reduced(given: Given) -> Reduced:
     right = np.zeros((g.shape[0], chosen.size + ORDERS * len(given.names)))
     right[:, chosen.size :] = given.right(np.arange(g.shape[0]))
 
-    def made(moved: NDArray[Any], noise: float = NOISE) -> Reduced:
+    def make(moved: NDArray[Any], noise: float = NOISE) -> Reduced:
         return _without_rates_of_inputs(given, moved, rates, chosen, noise)
 
-    small = made(_moved(g, right, chosen, moves))
+    small = make(_variations(g, right, chosen, moves))
     again = precise.shaken(g)
-    values, others = (np.linalg.eigvals(part) for part in (small.a, made(_moved(again, right, chosen, moves)).a))
+    values, others = (np.linalg.eigvals(part) for part in (small.a, make(_variations(again, right, chosen, moves)).a))
     if precise.steady(values[values != 0.0], others[others != 0.0]):
         return small
-    if small.names and (found := _widened(len(small.names), made, (g, again, right, chosen, moves))) is not None:
+    if (
+        small.names
+        and (found := _reduce_precisely(len(small.names), make, (g, again, right, chosen, moves))) is not None
+    ):
         return found
-    return replace(small, unsure=made(_moved(again, right, chosen, moves), NOISE).a)
+    return replace(small, unsure=make(_variations(again, right, chosen, moves), NOISE).a)
 
 
 def widely_reduced(given: Given) -> Reduced | None:
@@ -245,10 +248,10 @@ def widely_reduced(given: Given) -> Reduced | None:
     right[: used.size, chosen.size :] = given.right(used)
     rates = _rates(starter, system, chosen)
 
-    def made(moved: NDArray[Any], noise: float) -> Reduced:
+    def make(moved: NDArray[Any], noise: float) -> Reduced:
         return _without_rates_of_inputs(given, moved, rates, chosen, noise)
 
-    return _widened(chosen.size, made, (g, again, right, chosen, units))
+    return _reduce_precisely(chosen.size, make, (g, again, right, chosen, units))
 
 
 def _follow(g: Floats, left: NDArray[np.int64], states: Mask, units: Floats, rates: NDArray[np.int64]) -> bool:
@@ -263,7 +266,7 @@ def _follow(g: Floats, left: NDArray[np.int64], states: Mask, units: Floats, rat
     return bool((moved > TOLERANCE).any())
 
 
-def _widened(
+def _reduce_precisely(
     states: int,
     made: Callable[[NDArray[Any], float], Reduced],
     given: tuple[Floats, Floats, Floats, NDArray[np.int64], Floats],
@@ -279,7 +282,7 @@ def _widened(
         found, beside = (made(part, precise.NOTHING) for part in (one, other))
         parts = _wide(found, _wide(beside))
         values = precise.decompose(np.asarray(beside.a, dtype=object)).values
-        seen = precise.settled(precise.decompose(parts.a), values, lost)
+        seen = precise.settle_modes(precise.decompose(parts.a), values, describe_lost)
         matrices = (found.a, found.b, found.c, found.d, found.d1, found.d2)
         a, b, c, d, d1, d2 = map(precise.narrow, matrices)
         return Reduced(a, b, c, d, d1, d2, found.places, found.names, parts, seen)
@@ -290,20 +293,20 @@ def _wide(small: Reduced, beside: Wide | None = None) -> Wide:
     return Wide(a, b, c, d, beside)
 
 
-def lost(value: complex) -> NoLinearisation:
+def describe_lost(value: complex) -> NoLinearisation:
     """What is said of an eigenvalue that round-off hides."""
     return NoLinearisation(f"the eigenvalue near {abs(value):.3g} 1/s is lost in the round-off of the fastest")
 
 
 def _moved_widely(g: Floats, right: Floats, chosen: NDArray[np.int64], moves: Floats) -> precise.Wide | None:
-    """The variations of `_moved` in many digits; None where the rows leave one open."""
+    """The variations of `_variations` in many digits; None where the rows leave one open."""
     rest = np.setdiff1d(np.arange(g.shape[1]), chosen)
     aim = precise.wide(right)
     aim[:, : chosen.size] -= precise.wide(g[:, chosen])
     # powers of two change no digit
     scale: Floats = np.exp2(np.round(np.log2(moves[rest]))).astype(np.float64)
     found = precise.wide(np.zeros((g.shape[1], right.shape[1])))
-    solved = precise.eliminated(g[:, rest] * scale, aim)
+    solved = precise.eliminate_consistent(g[:, rest] * scale, aim)
     if solved is None:
         return None
     found[rest] = precise.wide(scale)[:, None] * solved
@@ -311,7 +314,7 @@ def _moved_widely(g: Floats, right: Floats, chosen: NDArray[np.int64], moves: Fl
     return found
 
 
-def _moved(g: Floats, right: Floats, chosen: NDArray[np.int64], moves: Floats) -> Floats:
+def _variations(g: Floats, right: Floats, chosen: NDArray[np.int64], moves: Floats) -> Floats:
     """The variations [z, k] with G dz = right, dz = 1 in the chosen places of the first columns, each in its own.
 
     With rows and unknowns in units in which what moves moves alike, as many rows as unknowns are taken and eliminated:
@@ -326,18 +329,18 @@ def _moved(g: Floats, right: Floats, chosen: NDArray[np.int64], moves: Floats) -
     matrix = scaled[:, rest]
     kept = pivots(matrix, rest.size) if matrix.shape[0] >= rest.size else np.zeros(0, dtype=np.int64)
     found = np.zeros((moves.size, right.shape[1]))
-    found[rest] = _eliminated(matrix, aim, kept)
+    found[rest] = _solve_consistent(matrix, aim, kept)
     found[rest] = np.where(np.abs(found[rest]) > NOISE * np.abs(found[rest]).max(axis=0, initial=0.0), found[rest], 0.0)
     found[chosen, np.arange(states)] = 1.0 / moves[chosen]
     return moves[:, None] * found
 
 
-def _eliminated(matrix: Floats, aim: Floats, kept: NDArray[np.int64]) -> Floats:
+def _solve_consistent(matrix: Floats, aim: Floats, kept: NDArray[np.int64]) -> Floats:
     """The solution of consistent equations by rows that determine it, its residual small beside the terms of each row
     (Skeel 1980); by singular values where none do.
     """
     square = matrix[kept]
-    solve = _inverted(square)
+    solve = _inverse(square)
     if solve is not None:
         found = solve(aim[kept])
         for _ in range(2):
@@ -349,7 +352,7 @@ def _eliminated(matrix: Floats, aim: Floats, kept: NDArray[np.int64]) -> Floats:
     return found
 
 
-def _inverted(square: Floats) -> Callable[[Floats], Floats] | None:
+def _inverse(square: Floats) -> Callable[[Floats], Floats] | None:
     """What solves by a square matrix; None where singular values say that it has no inverse."""
     sure = sure_solver(square, CERTAIN) if square.shape[0] > FEW else None
     if sure is not None:
@@ -378,7 +381,7 @@ def _refuse_undetermined(
     """NoLinearisation where rates of states move though no state does: constraints are hidden deeper than the rows."""
     if part.shape[0] > max(FEW, part.shape[1]):  # the same directions, of a triangle
         part = np.linalg.qr(part)[1]
-    _, _, vt = decomposed(part) if part.size else (None, None, np.eye(tangent.shape[1]))
+    _, _, vt = singular_decomposition(part) if part.size else (None, None, np.eye(tangent.shape[1]))
     still = tangent @ vt[rank:].T
     if not still.size or not rates.size:
         return

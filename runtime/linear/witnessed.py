@@ -16,20 +16,20 @@ from sysdyn.runtime.linear.modes import modes
 from sysdyn.runtime.linear.pencil import Descriptor, motions, surely_parted, widely_parted
 from sysdyn.runtime.linear.precise import Values
 from sysdyn.runtime.linear.states import candidates_of, chosen_states
-from sysdyn.runtime.linear.tangent import Given, NoLinearisation, Reduced, lost, reduced, widely_reduced
+from sysdyn.runtime.linear.tangent import Given, NoLinearisation, Reduced, describe_lost, reduce, widely_reduced
 from sysdyn.runtime.linear.witness import CONTRAST, Witness, agrees, spread, witness
 
 COUNTED = 200
 """Unknowns up to which the states are counted twice."""
 
 
-def witnessed(given: Given, pencil: Descriptor | None, *, fixed: bool) -> Reduced:
+def reduce_witnessed(given: Given, pencil: Descriptor | None, *, fixed: bool) -> Reduced:
     """The reduction; of linear equations (fixed) one that the pencil's determinant does not contradict; pencil: of the
     form as written, where it holds too (at rest, or fixed).  NoLinearisation.
     """
     small, why = None, None
     try:
-        small = _reduced(given, pencil)
+        small = _reduce(given, pencil)
     except NoLinearisation as error:
         why = error
     seen = witness(pencil.e, pencil.a) if fixed and pencil is not None else None
@@ -43,18 +43,18 @@ def witnessed(given: Given, pencil: Descriptor | None, *, fixed: bool) -> Reduce
             doubtful = spread(pencil.e, pencil.a) > CONTRAST or not _singular(pencil)
             small, lasting = held[0] if held else small, bool(held) or not doubtful
         if not lasting:
-            raise why or _contradicted(seen)
+            raise why or _describe_contradiction(seen)
     if small is None:
         assert why is not None
         raise why
     return small
 
 
-def _reduced(given: Given, pencil: Descriptor | None) -> Reduced:
+def _reduce(given: Given, pencil: Descriptor | None) -> Reduced:
     """The reduction by the rows that hold, or by the pencil where that holds too and knows more.  NoLinearisation."""
     small = None
     try:
-        small = reduced(given)
+        small = reduce(given)
     except NoLinearisation:
         if pencil is None:
             raise
@@ -64,7 +64,7 @@ def _reduced(given: Given, pencil: Descriptor | None) -> Reduced:
     if small.unsure is not None and pencil is not None:  # the pencil may know it better
         small = _surer(small, given, pencil)
     if small.unsure is not None:
-        precise.refuse_lost(precise.eigenvalues(small.a), precise.eigenvalues(small.unsure), lost)
+        precise.refuse_lost(precise.eigenvalues(small.a), precise.eigenvalues(small.unsure), describe_lost)
     return small
 
 
@@ -143,7 +143,7 @@ def _values(small: Reduced) -> Values:
     return np.array([mode.eigenvalue for mode in modes(small.a, small.decomposed)], dtype=np.complex128)
 
 
-def _contradicted(seen: Witness) -> NoLinearisation:
+def _describe_contradiction(seen: Witness) -> NoLinearisation:
     """What is said where the modes found are not those of the equations."""
     cause = "the modes found are not those of the equations"
     if not seen.certain:

@@ -10,10 +10,10 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 from sysdyn.runtime import tuning
-from sysdyn.runtime.model.description import Floats, stated
+from sysdyn.runtime.model.description import Floats, statements
 from sysdyn.runtime.model.system import System
 from sysdyn.runtime.numerics.least_change import DENSE, RANK
-from sysdyn.runtime.numerics.rank import count, decomposed
+from sysdyn.runtime.numerics.rank import count, singular_decomposition
 from sysdyn.runtime.start.settled import Settler
 
 Mask = NDArray[np.bool_]
@@ -34,12 +34,12 @@ def anchors(settler: Settler, system: System, t: float, point: tuple[Floats, Flo
     n = system.form.written
     if n + settler.rates.size > LARGEST:
         return None
-    guess, _, said = stated(system.form.at, n, system.description.initial)
+    guess, _, said = statements(system.form.at, n, system.description.initial)
     state = np.isin(system.kinds[:n], STATE)
     stayed = np.abs(point[0] - guess) <= AGREES * np.maximum(magnitude[:n], np.abs(guess))
     anchored = said & stayed & state
     may = ~said & stayed & state
-    matrix = _scaled(settler, t, point, magnitude)
+    matrix = _scaled_jacobian(settler, t, point, magnitude)
     while True:
         free = np.concatenate([~anchored, np.ones(settler.rates.size, dtype=bool)])
         null = _null(matrix[:, free])
@@ -54,7 +54,7 @@ def anchors(settler: Settler, system: System, t: float, point: tuple[Floats, Flo
         anchored[k] = True
 
 
-def _scaled(settler: Settler, t: float, point: tuple[Floats, Floats], magnitude: Floats) -> Floats:
+def _scaled_jacobian(settler: Settler, t: float, point: tuple[Floats, Floats], magnitude: Floats) -> Floats:
     """The settled rows' Jacobian by unknowns and rates [rows, written + rates] in magnitudes, rows scaled to 1."""
     system = settler.system
     jy, jyd = system.jacobian(t, *point)
@@ -70,5 +70,5 @@ def _null(matrix: Floats) -> Floats:
         return np.zeros((0, 0))
     if not matrix.shape[0]:
         return np.eye(matrix.shape[1])
-    _, sigma, vectors = decomposed(matrix)
+    _, sigma, vectors = singular_decomposition(matrix)
     return np.asarray(vectors[count(sigma, RANK) :])

@@ -8,7 +8,7 @@ from sysdyn.runtime.accuracy.options import Options, choose_method
 from sysdyn.runtime.accuracy.way import Way
 from sysdyn.runtime.model.description import Floats, Ints
 from sysdyn.runtime.model.system import System
-from sysdyn.runtime.simulate import counted, form_name, formed
+from sysdyn.runtime.simulate import form_name, form_system, without_redundant
 from sysdyn.runtime.start.start import ConsistentState
 from sysdyn.runtime.structure.structure import Structure
 from sysdyn.values import dataclass
@@ -59,8 +59,8 @@ def way_of(
     written: System, start: ConsistentState, facts: Structure, options: Options, method: str
 ) -> tuple[Way, ConsistentState]:
     """The way with the method that a nominal run took, and the start in its layout."""
-    written, start, facts = counted(written, start, facts, options)
-    system, index, _ = formed(written, start, facts, options)
+    written, start, facts = without_redundant(written, start, facts, options)
+    system, index, _ = form_system(written, start, facts, options)
     first = Way(choose_method(options), system, index, form_name(system, facts))
     ways = (first,) if options.method != "auto" else alternatives(first, written, start, options)
     found = next((way for way in ways if way.method == method), None)

@@ -23,12 +23,12 @@ from sysdyn.runtime.accuracy.runs import APART, Runs
 from sysdyn.runtime.accuracy.way import Way
 from sysdyn.runtime.integrate.integrate import Integration
 from sysdyn.runtime.integrate.request import LONGEST, TRACE, Finished, Request, Statistics
-from sysdyn.runtime.judgement import allowed, judge, undefined
+from sysdyn.runtime.judgement import allowed_share, judge, not_met_undefined
 from sysdyn.runtime.many.anchors import anchors
 from sysdyn.runtime.many.asked import DONE, END, ROWS, TRACES, WHY, Claim, NotApplicableError, Results, obstacle
 from sysdyn.runtime.many.mass_matrix import mass_matrix
 from sysdyn.runtime.model import core_library as lib
-from sysdyn.runtime.model.description import Floats, stated
+from sysdyn.runtime.model.description import Floats, statements
 from sysdyn.runtime.model.failures import SolverFailure
 from sysdyn.runtime.model.scales import group_maxima, sizing
 from sysdyn.runtime.model.system import System
@@ -36,7 +36,7 @@ from sysdyn.runtime.numerics.ordering import net_order_of
 from sysdyn.runtime.simulate import close
 from sysdyn.runtime.start.settled import HELD, Settler
 from sysdyn.runtime.start.start import ConsistentState
-from sysdyn.runtime.structure.rates import determined
+from sysdyn.runtime.structure.rates import determined_rates
 from sysdyn.runtime.trace.keeping import Held
 from sysdyn.runtime.trace.trace import Trace, TraceParameter
 
@@ -88,7 +88,7 @@ class Batch:
         self.columns = tuple(column.name for column in self.runs.columns)
         self._thin = np.ascontiguousarray([] if thin is None or keep != TRACES else thin, dtype=np.int32)
         law = way.law
-        self._targets = self._wanted()
+        self._targets = self._wanted_quantities()
         finest = float(np.min(self._targets, initial=1.0))
         tolerance = law.tolerance(finest if finest < 1.0 else 1e-4)
         draft = min(max(tolerance, law.finest) / law.ratio, law.loosest)
@@ -105,7 +105,7 @@ class Batch:
         self.core.keep = keep
         if keep == ROWS:
             written = way.system if way.system.form.name == "3" else way.system.another("3")
-            self.runs.derive(determined(written, start))
+            self.runs.derive(determined_rates(written, start))
         self._loosen(law)
 
     def _loosen(self, law: Law) -> None:
@@ -113,7 +113,7 @@ class Batch:
 
         What a run's estimate then misses costs it a finer run, never its promise.
         """
-        guess = stated(self.system.form.at, self.system.form.written, self.system.description.initial)[0]
+        guess = statements(self.system.form.at, self.system.form.written, self.system.description.initial)[0]
         found = self.run(self.system.description.p[None, :], guess[None, :])
         if found.state[0] != DONE:
             if self.core.keep == ROWS:
@@ -125,12 +125,12 @@ class Batch:
         factor = max(min(factor, law.loosest / tolerance[0]), 1.0)
         tolerance[0], tolerance[1] = factor * tolerance[0], factor * tolerance[1]
 
-    def _kept(self, array: Any) -> int | None:
+    def _keep_address(self, array: Any) -> int | None:
         """Address of an array that lives as long as this."""
         self._alive.append(array)
         return lib.pointer(array)
 
-    def _wanted(self) -> Floats:
+    def _wanted_quantities(self) -> Floats:
         options, names = self.options, list(self.runs.quantities.compared)
         target = np.full(len(names), np.inf if options.accuracy is None else options.accuracy)
         for name, wanted in options.accuracy_on:
@@ -173,7 +173,7 @@ class Batch:
         return regions, len(found)
 
     @staticmethod
-    def _settled(settler: Settler) -> list[tuple[int, int]]:
+    def _settle(settler: Settler) -> list[tuple[int, int]]:
         core = settler.core.contents
         moves = core.unknowns + core.rates
         return [(c.addressof(core), c.sizeof(lib.Settle)), (core.scale, 8 * moves)]
@@ -186,7 +186,7 @@ class Batch:
         settlers = [made.settler, *([made.projection] if made.projection is not None else [])]
         zero = [lib.core.sd_linear_pivoted(made.linear)]
         for settler in settlers:
-            states += self._settled(settler)
+            states += self._settle(settler)
             zero += [lib.core.sd_linear_pivoted(settler.linear), lib.core.sd_settle_pivoted(settler.core)]
         if made.underlying is not None:
             states.append((c.addressof(made.underlying.core.contents), c.sizeof(lib.Underlying)))
@@ -199,10 +199,10 @@ class Batch:
         field = self.core.passes[k]
         field.run, field.region, field.regions = c.addressof(made.driver.run), c.addressof(regions), number
         field.n = system.unknowns
-        field.y, field.yd, field.start_rate = (self._kept(room) for room in rooms)
-        field.differential = self._kept(made.roles.differential.astype(np.int32))
+        field.y, field.yd, field.start_rate = (self._keep_address(room) for room in rooms)
+        field.differential = self._keep_address(made.roles.differential.astype(np.int32))
         field.magnitude, field.met = lib.pointer(made.sizes.magnitude), lib.pointer(made.sizes.met)
-        field.least = self._kept(np.ascontiguousarray(made.sizes.least))
+        field.least = self._keep_address(np.ascontiguousarray(made.sizes.least))
         field.project = None if made.projection is None else c.addressof(made.projection.core.contents)
         field.rtol = c.addressof(core) + kind.rtol.offset
         field.h_max = c.addressof(core) + kind.h_max.offset
@@ -231,7 +231,7 @@ class Batch:
         if found is None:
             raise NotApplicableError("initial values of the text leave the start open, or move for its sake")
         self.anchored = found
-        settler = made.settlers.of("settled", found)
+        settler = made.settlers.settler_of("settled", found)
         settled = settler.system
         # rows written with room for what settles: the buffers of both passes are used
         extended = np.zeros(settled.form.extended), np.zeros(settled.form.extended)
@@ -247,18 +247,18 @@ class Batch:
         core.hold, core.ready = HELD, 0
         many.smallest = settler.linear.contents.smallest
         factors = [lib.core.sd_linear_pivoted(settler.linear), lib.core.sd_settle_pivoted(settler.core)]
-        regions, number = self._regions(self._settled(settler), factors)
+        regions, number = self._regions(self._settle(settler), factors)
         many.start, many.region, many.regions = c.addressof(core), c.addressof(regions), number
         self._alive += [settler, settled]
-        many.y0, many.yd0 = self._kept(y.copy()), self._kept(yd.copy())
-        many.anchored = self._kept(found.astype(np.int32))
-        guess, _, said = stated(system.form.at, n, system.description.initial)
-        many.guessed, many.guess = self._kept((said & ~found).astype(np.int32)), self._kept(guess)
-        many.size = self._kept(made.sizes.magnitude[:n].copy())
-        many.jy0, many.jyd0 = self._kept(np.append(jy, 0.0)), self._kept(np.append(jyd, 0.0))
+        many.y0, many.yd0 = self._keep_address(y.copy()), self._keep_address(yd.copy())
+        many.anchored = self._keep_address(found.astype(np.int32))
+        guess, _, said = statements(system.form.at, n, system.description.initial)
+        many.guessed, many.guess = self._keep_address((said & ~found).astype(np.int32)), self._keep_address(guess)
+        many.size = self._keep_address(made.sizes.magnitude[:n].copy())
+        many.jy0, many.jyd0 = self._keep_address(np.append(jy, 0.0)), self._keep_address(np.append(jyd, 0.0))
         counts = 1 * _counts(settled, jy, settler.scale[:n]) + 2 * _counts(settled, jyd, self._rates(settler, n))
-        many.counts = self._kept(np.append(counts, 0).astype(np.int32))
-        many.jy, many.jyd = self._kept(np.zeros(jy.size + 1)), self._kept(np.zeros(jy.size + 1))
+        many.counts = self._keep_address(np.append(counts, 0).astype(np.int32))
+        many.jy, many.jyd = self._keep_address(np.zeros(jy.size + 1)), self._keep_address(np.zeros(jy.size + 1))
         self._inertia(settled)
 
     @staticmethod
@@ -273,9 +273,9 @@ class Batch:
         many, found = self.core, mass_matrix(settled)
         many.flows, many.inertias = found.flows, found.entry.size
         places = found.row, found.column, found.entry
-        many.inertia_row, many.inertia_column, many.inertia_entry = map(self._kept, places)
-        many.inertia_rate, many.inertia_sign = self._kept(found.rate), self._kept(found.sign)
-        many.inertia = self._kept(np.zeros(found.flows**2 + 1))
+        many.inertia_row, many.inertia_column, many.inertia_entry = map(self._keep_address, places)
+        many.inertia_rate, many.inertia_sign = self._keep_address(found.rate), self._keep_address(found.sign)
+        many.inertia = self._keep_address(np.zeros(found.flows**2 + 1))
 
     def _measure(self, longest: float, law: Any, draft: float, fine: float) -> None:
         """Magnitudes, quantities, accuracy and room."""
@@ -289,12 +289,12 @@ class Batch:
         self._alive.append(sizes)
         many.system, many.sizing = c.addressof(system.core), c.addressof(sizes.core)
         many.order = net_order_of(system).address
-        many.form_jy, many.form_jyd = (self._kept(np.zeros(system.pattern.entries + 1)) for _ in range(2))
-        many.found, many.ceiling = (self._kept(np.zeros(system.unknowns + 1)) for _ in range(2))
+        many.form_jy, many.form_jyd = (self._keep_address(np.zeros(system.pattern.entries + 1)) for _ in range(2))
+        many.found, many.ceiling = (self._keep_address(np.zeros(system.unknowns + 1)) for _ in range(2))
         for k in (0, 1):
             self._fill(k, min((DRAFT, 1.0)[k] * longest * span, options.longest or np.inf))
-        many.column = self._kept(np.array([column.place for column in runs.columns], dtype=np.int32))
-        many.target = self._kept(self._targets)
+        many.column = self._keep_address(np.array([column.place for column in runs.columns], dtype=np.int32))
+        many.target = self._keep_address(self._targets)
         families = system.description.families
         units: dict[str, int] = {}
         own = [units.setdefault(column.unit, len(units)) for column in runs.columns]
@@ -302,7 +302,7 @@ class Batch:
         for family, first in zip(families, system.form.at, strict=False):
             if family.size and first + family.size <= n and family.unit in units:
                 of[first : first + family.size] = units[family.unit]
-        many.unit, many.unit_of = self._kept(np.array(own, dtype=np.int32)), self._kept(of)
+        many.unit, many.unit_of = self._keep_address(np.array(own, dtype=np.int32)), self._keep_address(of)
         many.units, many.known = len(units), int(runs.instants.common is not None)
         asked = float(np.min(self._targets[np.isfinite(self._targets)], initial=1.0))
         many.late = min(pairs.TIMING, pairs.SHARE * asked) * span
@@ -332,19 +332,19 @@ class Batch:
         many.few_steps, many.many_steps = FEW_STEPS, law.most
         many.tolerance[0], many.tolerance[1] = draft, fine
         many.max_steps = min(options.max_steps or 2**62, 2**62)
-        many.energy = allowed(options)
-        many.thin, many.thins = self._kept(np.append(self._thin, np.int32(-1))), self._thin.size
+        many.energy = allowed_share(options)
+        many.thin, many.thins = self._keep_address(np.append(self._thin, np.int32(-1))), self._thin.size
         room = max(2 * MOST + 4, 0 if runs.instants.common is None else runs.instants.common.size + 4)
         for k in range(3):
             many.sample[k] = lib.RunSamples(
-                time=self._kept(np.zeros(room)),
-                value=self._kept(np.zeros(room * columns + 1)),
-                late=self._kept(np.zeros(room * columns + 1)),
+                time=self._keep_address(np.zeros(room)),
+                value=self._keep_address(np.zeros(room * columns + 1)),
+                late=self._keep_address(np.zeros(room * columns + 1)),
                 number=0,
                 room=room,
             )
-        many.kind = self._kept(np.zeros(room, dtype=np.int32))
-        many.work = self._kept(np.zeros(4 * columns + 2 * len(units) + 8))
+        many.kind = self._keep_address(np.zeros(room, dtype=np.int32))
+        many.work = self._keep_address(np.zeros(4 * columns + 2 * len(units) + 8))
 
     def _claims(self, claims: tuple[Claim, ...]) -> None:
         """Expectations that the core looks at."""
@@ -396,7 +396,7 @@ class Batch:
         finished = Finished(
             self.options.t_end,
             runs.accounts.statistics,
-            group_maxima(made.system, made.confirmed(*made.sizes.at(made.method.point()[0]))),
+            group_maxima(made.system, made.confirm_magnitudes(*made.sizes.sizes_at(made.method.point()[0]))),
             made.driver.largest(),
             core.spent,
             made.settler.core.contents.failures,
@@ -407,7 +407,9 @@ class Batch:
         writer.append(rows[(rows[:, 1].astype(np.int32) & TRACE) > 0])
         runs.done = finished, [], writer
         estimate = float(found.estimate[0])
-        judgement = judge(self.options, runs.method, finished.balances, True, undefined(writer.undefined()))
+        judgement = judge(
+            self.options, runs.method, finished.balances, True, not_met_undefined(writer.first_undefined())
+        )
         close(runs, Achieved(estimate, True, 0, 0.0), judgement)
         return runs.held
 

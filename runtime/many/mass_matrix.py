@@ -49,9 +49,9 @@ def mass_matrix(settled: System) -> MassMatrix:
         parts.append((number, place[columns[entries]], entries, int(dynamic), 1.0 if dynamic else -1.0))
     sizes = [len(part[2]) for part in parts]
 
-    def joined(k: int) -> Any:
+    def join_blocks(k: int) -> Any:
         return np.concatenate([np.zeros(0), *(np.asarray(part[k]) for part in parts)]).astype(np.int32)
 
     rate = np.repeat(np.array([p[3] for p in parts], dtype=np.int32), sizes)
     sign = np.repeat(np.array([p[4] for p in parts], dtype=float), sizes)
-    return MassMatrix(flows.size, joined(0), joined(1), joined(2), rate, sign)
+    return MassMatrix(flows.size, join_blocks(0), join_blocks(1), join_blocks(2), rate, sign)

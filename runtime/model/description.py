@@ -81,7 +81,7 @@ Elements = Sequence[tuple[str, str, int]]
 """Name, file and line of each element, from index 0 on, of a family whose elements the author wrote one by one."""
 
 
-def named(name: str, shape: Shape, elements: Elements, position: int) -> tuple[str, str, int]:
+def name_of(name: str, shape: Shape, elements: Elements, position: int) -> tuple[str, str, int]:
     """What the element of a family is called, and where it stands ("", 0: where the family does)."""
     if not elements:
         return element(name, shape, position), "", 0
@@ -103,9 +103,9 @@ class _Elements:
         """Number of elements."""
         return count(self.shape)
 
-    def named(self, position: int, name: str = "") -> str:
+    def name_of(self, position: int, name: str = "") -> str:
         """What an element is called; name: instead of the family's own."""
-        return named(name or self.name, self.shape, self.elements, position)[0]
+        return name_of(name or self.name, self.shape, self.elements, position)[0]
 
 
 @dataclass(frozen=True, slots=True)
@@ -120,11 +120,11 @@ class Family(_Elements):
     shape: Shape
     elements: Elements = ()
 
-    def named(self, position: int, name: str = "") -> str:
+    def name_of(self, position: int, name: str = "") -> str:
         """What an element is called, as the text writes it: the index behind its owner: `x[2]'`."""
         name = name or self.name
         if self.elements or not name.startswith(self.owner):
-            return named(name, self.shape, self.elements, position)[0]
+            return name_of(name, self.shape, self.elements, position)[0]
         return element(self.owner, self.shape, position) + name[len(self.owner) :]
 
 
@@ -146,9 +146,9 @@ class RowFamily(_Elements):
     content: bool
     elements: Elements = ()
 
-    def at(self, position: int) -> RowLabel:
+    def label_at(self, position: int) -> RowLabel:
         """The label of one row."""
-        name, file, line = named(self.label, self.shape, self.elements, position)
+        name, file, line = name_of(self.label, self.shape, self.elements, position)
         return RowLabel(name, self.kind, file or self.file, line or self.line, unit=self.unit)
 
 
@@ -194,7 +194,9 @@ class Initial:
     label: RowLabel
 
 
-def stated(at: Ints, size: int, initial: tuple[Initial, ...]) -> tuple[Floats, NDArray[np.bool_], NDArray[np.bool_]]:
+def statements(
+    at: Ints, size: int, initial: tuple[Initial, ...]
+) -> tuple[Floats, NDArray[np.bool_], NDArray[np.bool_]]:
     """What a text says of unknowns at the start [size]: the values, 0 where it says nothing; which are fixed, and which
     are written.  Of an unknown that is said twice a fixed value counts; at: places of families, negative where the form
     has no such unknown (a displacement that is traced alone).
@@ -373,7 +375,7 @@ def describe(manifest: Mapping[str, Any], binding: Mapping[str, Any]) -> Descrip
         p=_numbers(binding),
         ix=np.ascontiguousarray(binding["ix"], dtype=np.int32),
         initial=initial,
-        switches=Switches(tuple(_switched(item, families, shapes) for item in structure.get("switches", ()))),
+        switches=Switches(tuple(_switch_place(item, families, shapes) for item in structure.get("switches", ()))),
         branches=tuple(int(place) for place in structure.get("branches", ())),
         holds=tuple(binding.get("holds", ())),
         systems={} if binding.get("alone") else None,
@@ -410,7 +412,9 @@ def _again(before: Description, binding: Mapping[str, Any]) -> Description:
     return replace(before, initial=tuple(found))
 
 
-def _switched(item: Mapping[str, Any], families: Sequence[Mapping[str, Any]], shapes: list[Shape]) -> tuple[int, int]:
+def _switch_place(
+    item: Mapping[str, Any], families: Sequence[Mapping[str, Any]], shapes: list[Shape]
+) -> tuple[int, int]:
     """Family and position of the multiplier of a constraint that holds at times."""
     family = next(k for k, f in enumerate(families) if f["kind"] in ("kappa", "mu") and f["owner"] == item["owner"])
     return family, position_of(shapes[family], item["at"])

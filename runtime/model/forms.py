@@ -157,7 +157,7 @@ class Form:
             return RowLabel(f"{unknown_name(description, self, place)}' = f", "kinematic")
         for group, family, first in reversed(self.groups):
             if row >= first:
-                label = description.rows[family].at(row - first)
+                label = description.rows[family].label_at(row - first)
                 return replace(label, kind=group) if group in BASE else label
         raise ContractError(f"row {row} belongs to no family")
 
@@ -168,12 +168,12 @@ def unknown_name(description: Description, form: Form, place: int) -> str:
     for k in reversed(np.flatnonzero(form.at <= place).tolist() if known else []):
         family = description.families[k]
         if family.kind != "audit" and place < form.at[k] + family.size:
-            return family.named(place - int(form.at[k]))
+            return family.name_of(place - int(form.at[k]))
     place -= form.written
     for k in description.families_of("kappa"):
         family = description.families[k]
         if place < family.size:
-            return family.named(place, nu_name(family.name))
+            return family.name_of(place, nu_name(family.name))
         place -= family.size
     raise ContractError(f"there is no unknown {place} behind the multipliers nu")
 
@@ -224,13 +224,13 @@ def _kinematics(description: Description, at: Ints) -> tuple[Ints, Ints, dict[st
     return np.concatenate(places_q).astype(np.int32), np.concatenate(places_f).astype(np.int32), first
 
 
-def _stabilised(rows: tuple[RowFamily, ...], home: str, first: dict[str, int]) -> Ints:
+def _stabilised_places(rows: tuple[RowFamily, ...], home: str, first: dict[str, int]) -> Ints:
     """`to` of a block that adds to the rows q' - f of the coordinates that its rows are of."""
     places = [first.get(row.owner, NOWHERE) if row.block == home else NOWHERE for row in rows]
     return np.array(places, dtype=np.int32)
 
 
-def _leveled(
+def _level_calls(
     calls: list[Planned], level: set[int], rows: tuple[RowFamily, ...], number: int
 ) -> tuple[list[Planned], int]:
     """The calls with constraints of these families as they are in the rows of their derivatives, and how many rows:
@@ -305,7 +305,7 @@ def plan(description: Description, name: str) -> Form:
                 nu[k] = unknowns
                 kind.append(("nu", description.families[k].size))
                 unknowns += description.families[k].size
-            calls.append(Planned(block, nu, _stabilised(description.rows, BASE.get(block, block), first)))
+            calls.append(Planned(block, nu, _stabilised_places(description.rows, BASE.get(block, block), first)))
         else:
             calls.append(Planned(block, at, tables[group]))
             if block + SCALE in description.blocks:
@@ -315,7 +315,7 @@ def plan(description: Description, name: str) -> Form:
         size = sum(description.families[k].size for k in description.families_of(one))
         kind.append((one, size))
         unknowns += size
-    calls, number = _leveled(calls, level, description.rows, number)
+    calls, number = _level_calls(calls, level, description.rows, number)
     return Form(
         name=name,
         written=written,

@@ -78,7 +78,7 @@ class Inertia:
         self.balances = entries("dynamics", flow, jyd)
         self.by_flow, self.by_momentum = entries("momentum", flow, jy), entries("momentum", momentum, jy)
 
-    def joined(self) -> Places:
+    def joined_pairs(self) -> Places:
         """Pairs of flows [2, k] of which one has an inertia in the other's rows."""
         parts = self.balances, self.by_flow, self.by_momentum
         return np.hstack([np.stack([i[v != 0.0], j[v != 0.0]]) for i, j, v in parts])
@@ -124,7 +124,7 @@ class Inertia:
         return bool((np.abs(total) <= CANCELS * size).all())
 
 
-def joined(system: System) -> NDArray[np.bool_]:
+def flows_joined(system: System) -> NDArray[np.bool_]:
     """Flows whose coordinate's rows may hold inertia of another one's, or theirs its own [unknowns]."""
     columns, flows = system.pattern.columns_of(), system.are("f")
     in_y, in_rate = system.structural()

@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 from sysdyn.runtime.model.description import Description, Ints
 from sysdyn.runtime.model.forms import Form, Planned
 from sysdyn.runtime.model.held_rows import LeftOut, held_rows, switch_rows
-from sysdyn.runtime.model.patterns import Pattern, Places, compress, joined, places
+from sysdyn.runtime.model.patterns import Pattern, Places, compress, join, places
 from sysdyn.values import dataclass
 
 
@@ -34,7 +34,7 @@ def laid_out(description: Description, form: Form, left_out: LeftOut) -> Layout:
     times = switch_rows(description, form)
     parts.append(Places(np.concatenate([held[0], times[0]]), np.concatenate([held[1], times[1]])))
     last, sizes = parts[-1], [part.row.size for part in parts]
-    parts = [joined(parts)]  # of a large one the room counts
+    parts = [join(parts)]  # of a large one the room counts
     pattern, (number,) = compress(form.rows, form.unknowns, parts)
     slots = [np.ascontiguousarray(piece) for piece in np.split(number, np.cumsum(sizes)[:-1])]
     place = np.concatenate([np.full(held[0].size, -1), times[2]])

@@ -46,13 +46,13 @@ class Pattern:
 
     def columns_of(self) -> Ints:
         """Column of each entry [entries]; read-only."""
-        return self._columns if self.entries <= KEPT else self._made()
+        return self._columns if self.entries <= KEPT else self._make()
 
     @cached_property
     def _columns(self) -> Ints:
-        return self._made()
+        return self._make()
 
-    def _made(self) -> Ints:
+    def _make(self) -> Ints:
         found = np.empty(self.entries, dtype=np.int32)
         lib.core.sd_firsts(self.unknowns, lib.pointer(self.column), lib.pointer(found))
         return read_only(found)
@@ -160,7 +160,9 @@ def places(
     )
 
 
-def spared(kernels: Sequence[Kernel], read: NDArray[np.bool_], ix: Ints, shapes: Sequence[Shape], to: Ints) -> Ints:
+def spared_loops(
+    kernels: Sequence[Kernel], read: NDArray[np.bool_], ix: Ints, shapes: Sequence[Shape], to: Ints
+) -> Ints:
     """1 for each loop of a block [kernels] that adds to none of the rows that are read [rows].  shapes, to: of row
     families.
     """
@@ -176,7 +178,7 @@ def spared(kernels: Sequence[Kernel], read: NDArray[np.bool_], ix: Ints, shapes:
     return found
 
 
-def joined(parts: Sequence[Places]) -> Places:
+def join(parts: Sequence[Places]) -> Places:
     """All parts one behind the other (int32)."""
     if len(parts) == 1:
         return Places(*(np.asarray(item, dtype=np.int32) for item in (parts[0].row, parts[0].column)))
@@ -190,17 +192,17 @@ def joined(parts: Sequence[Places]) -> Places:
 
 def compress(rows: int, unknowns: int, parts: Sequence[Places]) -> tuple[Pattern, list[Ints]]:
     """One pattern that holds all parts, and for each part the place of each of its entries (int32)."""
-    one = joined(parts)
+    one = join(parts)
     row, column = one.row, one.column
     if row.size and (row.min() < 0 or row.max() >= rows or column.min() < 0 or column.max() >= unknowns):
         raise ContractError("an entry lies outside the matrix")
-    number, starts, own = numbered(column, row, unknowns, rows)
+    number, starts, own = number_pairs(column, row, unknowns, rows)
     cuts = np.cumsum([part.row.size for part in parts])[:-1]
     slots = [np.ascontiguousarray(piece) for piece in np.split(number, cuts)]
     return Pattern(rows, unknowns, starts, own), slots
 
 
-def numbered(
+def number_pairs(
     first: NDArray[np.integer], second: NDArray[np.integer], firsts: int, seconds: int
 ) -> tuple[Ints, Ints, Ints]:
     """The place of each pair [entries] among the distinct ones in ascending order; where those of each first begin

@@ -29,7 +29,7 @@ class Redirected:
         return c.addressof(self.core)
 
 
-def redirected(system: System, dy: Ints, dyd: Ints, entries: int) -> Redirected:
+def redirect_entries(system: System, dy: Ints, dyd: Ints, entries: int) -> Redirected:
     """With the entries of dF/dy, dF/dyd in other places, so many in all: dy, dyd [entries of the pattern]."""
     made = lib.System.from_buffer_copy(system.core)
     calls = (lib.Call * max(len(system.form.calls), 1))()
@@ -37,12 +37,12 @@ def redirected(system: System, dy: Ints, dyd: Ints, entries: int) -> Redirected:
     for k, planned in enumerate(system.form.calls):
         calls[k] = system.calls[k]
         for which, number, slots in (("dy", dy, system.slots[2 * k + 2]), ("dyd", dyd, system.slots[2 * k + 3])):
-            keep.append(_told(system, calls[k], planned.block, which, number[slots]))
+            keep.append(_redirect_call(system, calls[k], planned.block, which, number[slots]))
     made.call, made.entries, made.column, made.row = c.addressof(calls), entries, None, None
     return Redirected(made, calls, keep)
 
 
-def _told(system: System, call: lib.Call, block: str, which: str, slots: Ints) -> Any:
+def _redirect_call(system: System, call: lib.Call, block: str, which: str, slots: Ints) -> Any:
     """Tells a call where the entries of its list dy or dyd stand; of a large system by stretches, where these are few.
     What has to be kept for it.
     """

@@ -63,7 +63,7 @@ def sizing(system: System) -> Sizing:
 def _sizing(system: System) -> Sizing:
     rows, nominal = balance(system), system.named
     kind, own = _kinds(system), [places.astype(np.int32) for places in own_places(system)]
-    effort, moved = (item.astype(np.int32) for item in _displaced(system))
+    effort, moved = (item.astype(np.int32) for item in _rows_of_displacements(system))
     partner = None
     if system.are("p").any():
         partner = np.full(system.unknowns, -1, dtype=np.int32)
@@ -108,7 +108,7 @@ def balance(system: System) -> Balance:
     return system.once("balance", lambda: Balance(system.rows, pattern.row, pattern.columns_of(), alike(system)))
 
 
-def _displaced(system: System) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+def _rows_of_displacements(system: System) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
     """Rows of dynamics, and the places of their displacements."""
     form, description = system.form, system.description
     places = {description.families[k].owner: k for k in description.families_of("q")}
@@ -195,7 +195,7 @@ def _largest(begin: NDArray[np.integer], of: NDArray[np.integer], values: Floats
     return np.repeat(largest[of], np.diff(begin, append=values.size))
 
 
-def balanced(system: System, y: Floats, jy: Floats) -> Floats:
+def balanced_sizes(system: System, y: Floats, jy: Floats) -> Floats:
     """Size of each unknown at a point [unknowns], all positive: |y|, or what balances its rows."""
     size = np.where(np.isfinite(jy), np.abs(jy), 0.0)
     found = balance(system).propagate(np.abs(y), size, np.zeros(system.rows), largest=True)
@@ -203,7 +203,7 @@ def balanced(system: System, y: Floats, jy: Floats) -> Floats:
     return np.where(found > 0.0, found, 1.0)
 
 
-def unresolved(system: System, y: Floats, jy: Floats) -> Floats:
+def unresolved_sizes(system: System, y: Floats, jy: Floats) -> Floats:
     """What round-off leaves open of each unknown [unknowns]: of the terms of the constraints that it stands in.
 
     A charge of 1e-17 C in a sum with one of 0.1 C is known to 1e-17 C, whatever tolerance is asked of it.
@@ -281,7 +281,7 @@ def _finite(x: Floats) -> Floats:
     return x if finite.all() else np.where(finite, x, 0.0)
 
 
-def confirmed(system: System, span: float, met: Floats, magnitude: Floats) -> Floats:
+def confirm_magnitudes(system: System, span: float, met: Floats, magnitude: Floats) -> Floats:
     """Magnitudes after a run [unknowns]: the largest |y| it met and a thousandth of that among unknowns of the same
     kind and unit, where that is less than it went by and not round-off.  Multipliers keep theirs: what they met may be
     round-off altogether.

@@ -20,7 +20,7 @@ from sysdyn.runtime.model.facts import Facts, Found, Mask
 from sysdyn.runtime.model.forms import Form, plan
 from sysdyn.runtime.model.held_rows import LeftOut
 from sysdyn.runtime.model.layout import Layout, laid_out
-from sysdyn.runtime.model.patterns import Pattern, read_only, spared
+from sysdyn.runtime.model.patterns import Pattern, read_only, spared_loops
 
 LARGE = 100_000
 """Unknowns beyond which what can be found again is let go: of a large model the room counts."""
@@ -42,7 +42,9 @@ class System(Facts):
         self._make(describe(manifest, binding), carrier, index_form)
 
     @classmethod
-    def of(cls, description: Description, carrier: Carrier, index_form: str, left_out: LeftOut = ()) -> System:
+    def from_description(
+        cls, description: Description, carrier: Carrier, index_form: str, left_out: LeftOut = ()
+    ) -> System:
         """The same from a description; left_out: multipliers (family, position) of constraints that do not count.
 
         Where the description has the systems of a run before it, one of those, at this one's numbers; else one that
@@ -62,11 +64,11 @@ class System(Facts):
 
     def another(self, index_form: str) -> System:
         """The same model in another form."""
-        return System.of(self.description, self.carrier, index_form, self.left_out)
+        return System.from_description(self.description, self.carrier, index_form, self.left_out)
 
-    def without(self, left_out: LeftOut) -> System:
+    def without_constraints(self, left_out: LeftOut) -> System:
         """The same form, these constraints left out."""
-        return System.of(self.description, self.carrier, self.form.name, left_out)
+        return System.from_description(self.description, self.carrier, self.form.name, left_out)
 
     def of_blocks(self, index_form: str) -> System:
         """The same model in another form for `rows_at` alone: nothing of its Jacobian is laid out."""
@@ -124,7 +126,7 @@ class System(Facts):
         self._kinematics(())
         if whole:
             self._slots = []
-            self._told(_NOWHERE)
+            self._place_entries(_NOWHERE)
 
     def own(self, name: Hashable, make: Callable[[], Found]) -> Found:
         """What is made of this system's structures in the core, whatever the numbers: once for all runs it serves."""
@@ -190,7 +192,7 @@ class System(Facts):
         layout = self._layout = self._laid_out()
         self._slots, self._away = list(layout.slots), False
         self._core.column, self._core.row = lib.pointer(layout.pattern.column), lib.pointer(layout.pattern.row)
-        self._told(lambda k: lib.pointer(layout.slots[k]))
+        self._place_entries(lambda k: lib.pointer(layout.slots[k]))
         self._kinematics((self.form.k_q, self.form.k_f))
         return layout
 
@@ -199,7 +201,7 @@ class System(Facts):
         self._k = places
         self._core.k_q, self._core.k_f = map(lib.pointer, places or (None, None))
 
-    def _told(self, address: Callable[[int], int | None]) -> None:
+    def _place_entries(self, address: Callable[[int], int | None]) -> None:
         """Where the entries of each part of the matrix stand."""
         self._core.k_slot_q, self._core.k_slot_f = address(0), address(1)
         for k in range(len(self.form.calls)):
@@ -336,7 +338,7 @@ class System(Facts):
     def spare_loops(self, call: lib.Call, block: str, read: Mask, to: Ints) -> None:
         """Tells a call which rows are read [rows]; to: where those of each family begin."""
         shapes = [row.shape for row in self.description.rows]
-        found = spared(self.description.blocks[block], read, self.description.ix, shapes, to)
+        found = spared_loops(self.description.blocks[block], read, self.description.ix, shapes, to)
         if found.any():
             self._keep.append(found)
             call.frame.spared = lib.pointer(found)
@@ -452,13 +454,13 @@ class System(Facts):
 
     def audit(self, t: float, y: Floats, yd: Floats) -> Floats:
         """[kinetic energy, potential energy (J), power dissipated, power supplied (W)]."""
-        return np.concatenate([self._audited(t, y, yd), np.zeros(4)])[:4]
+        return np.concatenate([self._audit_rows(t, y, yd), np.zeros(4)])[:4]
 
     def ledgers(self, t: float, y: Floats, yd: Floats) -> Floats:
         """Of each ledger [k, 4]: stored, power dissipated, power supplied, the sum of their magnitudes."""
-        return self._audited(t, y, yd)[4:].reshape(-1, 4)
+        return self._audit_rows(t, y, yd)[4:].reshape(-1, 4)
 
-    def _audited(self, t: float, y: Floats, yd: Floats) -> Floats:
+    def _audit_rows(self, t: float, y: Floats, yd: Floats) -> Floats:
         buffers = (self._buffer(item[: self.form.written]) for item in (y, yd))
         return self._evaluate("audit", t, *buffers)
 

@@ -18,7 +18,7 @@ SWEEPS = 8
 """The distance to one is halved in its logarithm by each: 1e200 becomes 6."""
 
 
-def equilibrated(*matrices: Floats) -> tuple[Floats, ...]:
+def equilibrate(*matrices: Floats) -> tuple[Floats, ...]:
     """Matrices [m, n] scaled by the same factors, so that the largest entry of all of them is near 1 in each line."""
     row, column = factors(*matrices)
     return tuple(row[:, None] * matrix * column[None, :] for matrix in matrices)

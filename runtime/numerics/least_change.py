@@ -16,9 +16,9 @@ from sysdyn.runtime.model import core_library as lib
 from sysdyn.runtime.model.description import Floats
 from sysdyn.runtime.numerics.equilibrate import factors, sparse_factors
 from sysdyn.runtime.numerics.products import add_product, largest_product
-from sysdyn.runtime.numerics.rank import NotFiniteError, count, decomposed, least_by, least_squares
+from sysdyn.runtime.numerics.rank import NotFiniteError, count, least_by, least_squares, singular_decomposition
 from sysdyn.runtime.numerics.symmetric import Symmetric
-from sysdyn.runtime.numerics.tall import by_columns, solved
+from sysdyn.runtime.numerics.tall import by_columns, solve_columns
 
 Mask = NDArray[np.bool_]
 SINGULAR_VALUES = 120
@@ -70,7 +70,7 @@ def least_norm(
     if columns is not None:
         matrix = columns
         del i, j, v
-        only = solved(matrix, aim, lambda u: largest_product(matrix.missed(u, aim), back) <= small, idle)
+        only = solve_columns(matrix, aim, lambda u: largest_product(matrix.residual(u, aim), back) <= small, idle)
         if only is not None:
             return only
         i, j, v = columns.entries()
@@ -121,12 +121,12 @@ def in_order(shape: tuple[int, int], entries: tuple[Any, Any, Floats], aim: Floa
     later = np.ones(shape[1], dtype=bool)
     for level in filter(np.any, levels):
         later = later & ~level
-        left, sigma, _ = decomposed(a[:, later] * column[later])
+        left, sigma, _ = singular_decomposition(a[:, later] * column[later])
         only = left[:, count(sigma) :].T  # what rows say of the level whatever comes later
         said, largest = only @ a[:, level], np.abs(a[:, level]).max(axis=0, initial=0.0)
         noise = NOTHING / min(sigma[: count(sigma)], default=1.0)  # of `only`, by the least that counts
         said[np.abs(said) <= noise * largest] = 0.0
-        left, sigma, right = decomposed(said)
+        left, sigma, right = singular_decomposition(said)
         k = int((sigma > RANK * largest.max(initial=0.0)).sum())  # nothing may be left of a level
         found[level] = right[:k].T @ ((left[:, :k].T @ (only @ aim)) / sigma[:k])
         aim = aim - a[:, level] @ found[level]
@@ -154,7 +154,7 @@ def _singular_values(shape: tuple[int, int], entries: tuple[Any, Any, Floats], a
 def _of_known(shape: tuple[int, int], entries: tuple[Any, Any, Floats], aim: Floats) -> Floats:
     """The same by the decomposition that is remembered, and once more for what that misses."""
     a = _full(shape, *entries)
-    parts = decomposed(a)
+    parts = singular_decomposition(a)
     found = least_by(parts, aim, RANK)
     return found + least_by(parts, aim - a @ found, RANK)
 
@@ -165,7 +165,7 @@ def _of_one_size(shape: tuple[int, int], entries: tuple[Any, Any, Floats], aim: 
     """
     i, j, v = entries
     size = sparse_factors(i, j, np.abs(v), shape)[1]
-    parts = decomposed(_full(shape, i, j, v * size[j]))
+    parts = singular_decomposition(_full(shape, i, j, v * size[j]))
     found, free = least_by(parts, aim, RANK), parts[2][count(parts[1], RANK) :].T
     return np.asarray(size * (found - free @ least_squares(size[:, None] * free, size * found, RANK)))
 

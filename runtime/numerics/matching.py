@@ -8,7 +8,7 @@ from sysdyn.runtime.model.description import Ints
 from sysdyn.runtime.model.patterns import Pattern
 
 
-def matched(pattern: Pattern, given: Ints | None = None) -> Ints:
+def match_rows(pattern: Pattern, given: Ints | None = None) -> Ints:
     """The row of each column [unknowns]; -1 where none is left for it, whatever the values.
 
     given [unknowns]: such rows, which stay but where one has to make room.

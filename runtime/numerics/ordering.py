@@ -17,7 +17,7 @@ from sysdyn.runtime.model.description import Ints
 from sysdyn.runtime.model.own_rows import own_rows
 from sysdyn.runtime.model.patterns import Pattern, Places, compress
 from sysdyn.runtime.model.system import System
-from sysdyn.runtime.numerics.matching import matched
+from sysdyn.runtime.numerics.matching import match_rows
 from sysdyn.values import dataclass
 
 DENSE = 16
@@ -77,13 +77,13 @@ class Order:
 
     def linear(self, pattern: Pattern) -> Any:
         """The core's factorisation of such matrices: the caller frees it, and keeps pattern and order alive."""
-        return self._made(lib.core.sd_linear_ordered, pattern)
+        return self._make_order(lib.core.sd_linear_ordered, pattern)
 
     def complex_linear(self, pattern: Pattern) -> int:
         """The same of complex ones: its address."""
-        return int(self._made(lib.core.sd_linear_z_ordered, pattern))
+        return int(self._make_order(lib.core.sd_linear_z_ordered, pattern))
 
-    def _made(self, make: Callable[..., Any], pattern: Pattern) -> Any:
+    def _make_order(self, make: Callable[..., Any], pattern: Pattern) -> Any:
         made = make(pattern.unknowns, lib.pointer(pattern.column), lib.pointer(pattern.row), self.address)
         if not made:
             raise MemoryError
@@ -109,7 +109,7 @@ def with_pairs(pattern: Pattern, order: Order, given: Callable[[], Ints | None] 
     n = pattern.unknowns
     if n <= SMALL or order.filled <= SHORT * n:
         return order
-    own = matched(pattern, given())
+    own = match_rows(pattern, given())
     if (own < 0).any():
         return order
     of = np.empty(n, dtype=np.int32)

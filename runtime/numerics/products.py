@@ -16,15 +16,15 @@ PIECE = 1 << 14
 
 def add_product(rows: Any, columns: Any, values: Floats, x: Floats, out: Floats) -> Floats:
     """Out [rows] += A x, which is handed back; values of A at (rows, columns) [entries]; x [columns]."""
-    return _added(lib.core.sd_add_product, rows, columns, values, x, out)
+    return _add_products(lib.core.sd_add_product, rows, columns, values, x, out)
 
 
 def add_sizes(rows: Any, columns: Any, values: Floats, x: Floats, out: Floats) -> Floats:
     """Out [rows] += |A| x, the same way."""
-    return _added(lib.core.sd_add_sizes, rows, columns, values, x, out)
+    return _add_products(lib.core.sd_add_sizes, rows, columns, values, x, out)
 
 
-def _added(function: Any, rows: Any, columns: Any, values: Floats, x: Floats, out: Floats) -> Floats:
+def _add_products(function: Any, rows: Any, columns: Any, values: Floats, x: Floats, out: Floats) -> Floats:
     arrays: list[NDArray[Any]] = [np.ascontiguousarray(item, dtype=np.int32) for item in (rows, columns)]
     arrays += [*(np.ascontiguousarray(item, dtype=np.float64) for item in (values, x)), out]
     function(values.size, *(lib.pointer(item) for item in arrays))
@@ -47,7 +47,7 @@ def pieces(size: int) -> Iterator[slice]:
     return (slice(k, k + PIECE) for k in range(0, size, PIECE))
 
 
-def linked(chosen: NDArray[np.bool_], of: Ints, at: Ints, size: int) -> NDArray[np.bool_]:
+def linked_places(chosen: NDArray[np.bool_], of: Ints, at: Ints, size: int) -> NDArray[np.bool_]:
     """Places [size] among `at` [entries] of those entries whose places `of` [entries] are chosen."""
     found = np.zeros(size, dtype=bool)
     for k in range(0, of.size, PIECE):

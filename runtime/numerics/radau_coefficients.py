@@ -166,7 +166,7 @@ def _complex(value: Any) -> str:
     return f"{_number(mp.re(value))} {'-' if imaginary < 0 else '+'} {_number(abs(imaginary))} * I"
 
 
-def _filled(items: list[str], indent: str) -> str:
+def _fill_lines(items: list[str], indent: str) -> str:
     """{a, b, ...} on lines of at most WIDTH characters."""
     lines, line = [], indent + "{"
     for k, item in enumerate(items):
@@ -184,20 +184,20 @@ def _method(stages: int) -> str:
     inner, pad = " " * 12, " " * 8
     real = [_number(found.inverse[i, j]) for i in range(stages) for j in range(stages)]
     lines = [f"    {{{stages}, {(stages - 1) // 2},"]
-    lines.append(_filled([_number(x) for x in found.c], pad) + ", /* c */")
-    lines.append(_filled([_number(x) for x in found.b], pad) + ", /* b */")
-    rows = [_filled(real[i * stages : (i + 1) * stages], inner) for i in range(stages)]
+    lines.append(_fill_lines([_number(x) for x in found.c], pad) + ", /* c */")
+    lines.append(_fill_lines([_number(x) for x in found.b], pad) + ", /* b */")
+    rows = [_fill_lines(real[i * stages : (i + 1) * stages], inner) for i in range(stages)]
     lines.append(pad + "{ /* A^-1 */\n" + ",\n".join(rows) + "},")
     lines.append(f"{pad}{_number(found.gamma)},")
-    lines.append(_filled([_complex(x) for x in found.values], pad) + ", /* lambda */")
-    lines.append(_filled([_number(x) for x in found.column], pad) + ", /* column, row of gamma */")
-    lines.append(_filled([_number(x) for x in found.row], pad) + ",")
+    lines.append(_fill_lines([_complex(x) for x in found.values], pad) + ", /* lambda */")
+    lines.append(_fill_lines([_number(x) for x in found.column], pad) + ", /* column, row of gamma */")
+    lines.append(_fill_lines([_number(x) for x in found.row], pad) + ",")
     for name, items in (("columns of lambda", found.columns), ("rows of lambda", found.rows)):
-        blocks = [_filled([_complex(x) for x in item], inner) for item in items]
+        blocks = [_fill_lines([_complex(x) for x in item], inner) for item in items]
         lines.append(pad + f"{{ /* {name} */\n" + ",\n".join(blocks) + "},")
-    lines.append(_filled([_number(x) for x in found.estimate], pad) + ", /* of the error */")
-    lines.append(_filled([_number(x) for x in found.lift], pad) + ", /* lift */")
-    blocks = [_filled([_number(x) for x in item], inner) for item in found.taylor]
+    lines.append(_fill_lines([_number(x) for x in found.estimate], pad) + ", /* of the error */")
+    lines.append(_fill_lines([_number(x) for x in found.lift], pad) + ", /* lift */")
+    blocks = [_fill_lines([_number(x) for x in item], inner) for item in found.taylor]
     lines.append(pad + "{ /* taylor */\n" + ",\n".join(blocks) + "},")
     lines.append(f"{pad}{_number(found.constant)}}},")
     return "\n".join(lines)

@@ -35,23 +35,23 @@ class NotFiniteError(ArithmeticError):
     """A matrix holds what is no number: nothing can be said of its rank."""
 
 
-def decomposed(matrix: Floats) -> tuple[Floats, Floats, Floats]:
+def singular_decomposition(matrix: Floats) -> tuple[Floats, Floats, Floats]:
     """U [m, m], singular values [min(m, n)] (falling), v^T [n, n] of a matrix [m, n]; read-only.  NotFiniteError."""
     if not np.isfinite(matrix).all():
         raise NotFiniteError
     if max(matrix.shape) > REMEMBERED:
-        return _decomposed(matrix)
-    return _remembered(np.ascontiguousarray(matrix, dtype=np.float64).tobytes(), *matrix.shape)
+        return _decompose(matrix)
+    return _recall(np.ascontiguousarray(matrix, dtype=np.float64).tobytes(), *matrix.shape)
 
 
 @functools.lru_cache(maxsize=DECOMPOSITIONS)
-def _remembered(data: bytes, m: int, n: int) -> tuple[Floats, Floats, Floats]:
+def _recall(data: bytes, m: int, n: int) -> tuple[Floats, Floats, Floats]:
     """The same of the numbers of a matrix: those of a linear network come again with every set of its switches."""
-    u, sigma, vt = _decomposed(np.frombuffer(data).reshape(m, n))
+    u, sigma, vt = _decompose(np.frombuffer(data).reshape(m, n))
     return read_only(u), read_only(sigma), read_only(vt)
 
 
-def _decomposed(matrix: Floats) -> tuple[Floats, Floats, Floats]:
+def _decompose(matrix: Floats) -> tuple[Floats, Floats, Floats]:
     try:
         u, sigma, vt = np.linalg.svd(matrix)
     except np.linalg.LinAlgError:  # LAPACK's fast algorithm gives up on a few finite matrices
@@ -68,7 +68,7 @@ def singular_values(matrix: Floats) -> Floats:
     try:
         return np.asarray(np.linalg.svd(matrix, compute_uv=False))
     except np.linalg.LinAlgError:
-        return decomposed(matrix)[1]
+        return singular_decomposition(matrix)[1]
 
 
 def sure_complement(matrix: Floats, smallest: float) -> Floats | None:
@@ -116,7 +116,7 @@ def rank(matrix: Floats) -> int:
 
 def null_space(matrix: Floats) -> Floats:
     """Orthonormal columns [n, n - rank] that an equilibrated matrix [m, n] maps to zero.  NotFiniteError."""
-    _, sigma, vt = decomposed(matrix)
+    _, sigma, vt = singular_decomposition(matrix)
     return np.asarray(vt[count(sigma) :].T)
 
 
@@ -141,11 +141,11 @@ def least_squares(matrix: Floats, aim: Floats, smallest: float = TOLERANCE) -> F
     try:
         return np.asarray(np.linalg.lstsq(matrix, aim, rcond=smallest)[0], dtype=np.float64)
     except np.linalg.LinAlgError:
-        return least_by(decomposed(matrix), aim, smallest)
+        return least_by(singular_decomposition(matrix), aim, smallest)
 
 
 def least_by(parts: tuple[Floats, Floats, Floats], aim: Floats, smallest: float = TOLERANCE) -> Floats:
-    """The same by a decomposition, as `decomposed` answers it."""
+    """The same by a decomposition, as `singular_decomposition` answers it."""
     u, sigma, vt = parts
     k = count(sigma, smallest)
     return np.asarray(vt[:k].T @ ((u[:, :k].T @ aim) / sigma[:k]))

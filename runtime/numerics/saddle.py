@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 from sysdyn.runtime.model.description import Ints
 from sysdyn.runtime.model.patterns import Pattern, Places, compress
-from sysdyn.runtime.numerics.matching import matched
+from sysdyn.runtime.numerics.matching import match_rows
 from sysdyn.runtime.numerics.ordering import SMALL, Order, any_order, least_fill
 
 
@@ -44,7 +44,7 @@ def _pivots(pattern: Pattern, state: NDArray[np.bool_], own: Ints) -> Ints:
     told = np.flatnonzero((row >= moves) & (column < moves))
     told = told[~state[column[told]]]
     rows, _ = compress(pattern.unknowns - moves, follow.size, [Places(row[told] - moves, number[column[told]])])
-    match = matched(rows, _once_each(own[follow]))
+    match = match_rows(rows, _once_each(own[follow]))
     found = np.arange(pattern.unknowns, dtype=np.int32)
     one, other = follow[match >= 0], moves + match[match >= 0]
     found[one], found[other] = other, one

@@ -60,7 +60,7 @@ class Columns:
         columns = self.pattern.columns_of()
         return self.pattern.row, columns if self.used.all() else np.flatnonzero(self.used)[columns], self.values
 
-    def missed(self, x: Floats, aim: Floats) -> Floats:
+    def residual(self, x: Floats, aim: Floats) -> Floats:
         """What aim [rows] is more than A x [rows]; x: of all unknowns."""
         found = np.zeros(self.rows)
         x = np.ascontiguousarray(x if self.used.all() else x[self.used])
@@ -105,7 +105,7 @@ def _in_order(i: Any, j: Any) -> bool:
     return True
 
 
-def determined(
+def determine(
     shape: tuple[int, int],
     entries: Entries,
     aim: Floats,
@@ -118,10 +118,10 @@ def determined(
     idle: unknowns [mask] that rows may leave open, as long as they move none but these: some of those are zero then.
     """
     columns = by_columns(shape, entries, fewer=idle is not None)
-    return None if columns is None else solved(columns, aim, met, idle)
+    return None if columns is None else solve_columns(columns, aim, met, idle)
 
 
-def solved(
+def solve_columns(
     columns: Columns,
     aim: Floats,
     met: Callable[[Floats], bool] = lambda _: True,
@@ -131,7 +131,7 @@ def solved(
     more = columns.pattern.rows - columns.rows
     if more:
         aim = np.append(aim, np.zeros(more))
-    for way in (_substituted, _factored if idle is None else _beside(idle)):
+    for way in (_substitute, _factor if idle is None else _determine_open(idle)):
         found = np.zeros(columns.pattern.unknowns)
         failed = way(columns, aim, found)
         if failed == MEMORY:
@@ -142,12 +142,12 @@ def solved(
     return None
 
 
-def _substituted(columns: Columns, aim: Floats, found: Floats) -> int:
+def _substitute(columns: Columns, aim: Floats, found: Floats) -> int:
     places, rows = (lib.pointer(item) for item in columns.arrays()), columns.pattern.rows
     return int(lib.core.sd_substituted(rows, found.size, *places, PIVOT, lib.pointer(aim), lib.pointer(found)))
 
 
-def _factored(
+def _factor(
     columns: Columns, aim: Floats | None, found: Floats | None, idle: Ints | None = None, along: Floats | None = None
 ) -> int:
     """Of core/linear/dense/tall.h."""
@@ -157,15 +157,15 @@ def _factored(
     return int(lib.core.sd_determined(pattern.rows, pattern.unknowns, *places, *limits, *last))
 
 
-def _beside(idle: NDArray[np.bool_]) -> Callable[[Columns, Floats, Floats], int]:
+def _determine_open(idle: NDArray[np.bool_]) -> Callable[[Columns, Floats, Floats], int]:
     """The same with unknowns that may be left open."""
 
-    def factored(columns: Columns, aim: Floats, found: Floats) -> int:
+    def factor(columns: Columns, aim: Floats, found: Floats) -> int:
         own, along = idle[columns.used], _generic(found.size)
-        failed = _factored(columns, aim, found, own.astype(np.int32), along)  # A along = 0: what it moves is open
+        failed = _factor(columns, aim, found, own.astype(np.int32), along)  # A along = 0: what it moves is open
         return failed or int((np.abs(along[~own]) > OPEN * np.abs(along).max(initial=0.0)).any())
 
-    return factored
+    return factor
 
 
 def _generic(number: int) -> Floats:
@@ -180,7 +180,7 @@ def left_open(shape: tuple[int, int], entries: Entries) -> Floats | None:
     columns = by_columns(shape, entries, fewer=True)
     assert columns is not None
     found = _generic(columns.pattern.unknowns)
-    failed = _factored(columns, None, None, along=found)
+    failed = _factor(columns, None, None, along=found)
     if failed == MEMORY:
         raise MemoryError
     if failed:

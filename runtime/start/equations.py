@@ -12,8 +12,8 @@ from numpy.typing import NDArray
 from sysdyn.runtime.model import core_library as lib
 from sysdyn.runtime.model.balance import Balance
 from sysdyn.runtime.model.description import Ints, Places
-from sysdyn.runtime.model.inertia import joined, own_unknown, with_flows
-from sysdyn.runtime.model.redirected import redirected
+from sysdyn.runtime.model.inertia import flows_joined, own_unknown, with_flows
+from sysdyn.runtime.model.redirected import redirect_entries
 from sysdyn.runtime.model.scales import alike, kinds_and_units
 from sysdyn.runtime.model.system import LARGE, System
 from sysdyn.runtime.start.settled import columns_of_rates, inertial_rates, rates_of
@@ -60,7 +60,7 @@ class Equations:
         self.measured = self._measured(settled, contents)
         self.momenta = self._momenta(settled, contents)
         del contents  # of a large model the room counts
-        self.joined = joined(settled)
+        self.joined = flows_joined(settled)
         self.rated_rows = settled.of_groups("dynamics_rate")
 
     def _entries(self, settled: System) -> None:
@@ -186,7 +186,7 @@ class Equations:
         found.rate, found.k_span = map(lib.pointer, (self.rates, form.k_span))
         places = self._places(settled)
         if self.unknowns > LARGE and settled.plain:  # the room counts
-            both = redirected(settled, *self._numbered(settled, *places), self.plain + self.rated)
+            both = redirect_entries(settled, *self._numbered(settled, *places), self.plain + self.rated)
             found.both, entry = both.address, None
         else:
             both, entry = None, np.concatenate(places)

@@ -21,14 +21,14 @@ from numpy.typing import NDArray
 from sysdyn.runtime import tuning
 from sysdyn.runtime.model import core_library as lib
 from sysdyn.runtime.model.balance import Balance
-from sysdyn.runtime.model.description import START, Floats, Initial, Ints, Places, stated
+from sysdyn.runtime.model.description import START, Floats, Initial, Ints, Places, statements
 from sysdyn.runtime.model.failures import InconsistentStart, RowLabel
 from sysdyn.runtime.model.inertia import Inertia, own_unknown
 from sysdyn.runtime.model.patterns import read_only
 from sysdyn.runtime.model.scales import largest_of_group
 from sysdyn.runtime.model.system import LARGE, System
 from sysdyn.runtime.numerics.least_change import DENSE, least_norm
-from sysdyn.runtime.numerics.products import add_sizes, linked
+from sysdyn.runtime.numerics.products import add_sizes, linked_places
 from sysdyn.runtime.numerics.work import Work
 from sysdyn.runtime.start.equations import Equations
 from sysdyn.runtime.start.residue import Residue
@@ -81,7 +81,7 @@ class Starter:
         self.settled = settled = system.another("start")
         if system.unknowns > LARGE:  # found again where it is asked
             system.put_away(whole=True)
-        values, fixed, written = stated(settled.form.at, settled.unknowns, settled.description.initial)
+        values, fixed, written = statements(settled.form.at, settled.unknowns, settled.description.initial)
         self._agreeing(values)
         self.equations = known = system.once(EQUATIONS, lambda: Equations(system, settled))
         self.core = settled.own(EQUATIONS, lambda: known.core(system, settled))
@@ -186,7 +186,7 @@ class Starter:
         arithmetic leaves of a zero (`sin(pi)`) is one.
         """
         said = np.abs(self.guess) > WRITTEN * self.largest_alike(self.guess)
-        bound = linked(~self.reading(self.free), self.rows, self.columns, self.free.size)
+        bound = linked_places(~self.reading(self.free), self.rows, self.columns, self.free.size)
         return ~self.free & ~bound & said
 
     def residual(self, t: float, x: Floats) -> Floats:
@@ -250,11 +250,11 @@ class Starter:
 
     def reading(self, unknowns: Mask) -> Mask:
         """Rows [rows] that read some of these unknowns."""
-        return linked(unknowns, self.columns, self.rows, self.settled.rows)
+        return linked_places(unknowns, self.columns, self.rows, self.settled.rows)
 
     def read(self, rows: Mask) -> Mask:
         """Unknowns that some of these rows [rows] read."""
-        return linked(rows, self.rows, self.columns, self.free.size)
+        return linked_places(rows, self.rows, self.columns, self.free.size)
 
     def rows_of(self, entries: Mask) -> Mask:
         """Rows [rows] of these entries."""

@@ -105,7 +105,7 @@ def of_many(points: list[Inertia], own: Places, most: int) -> Weights:
     one.  points: inertia at several points; own [rows]: the flow whose balance a row is, or -1.
     """
     number = points[0].size
-    joined = np.hstack([np.tile(np.arange(number), (2, 1)), *(point.joined() for point in points)])
+    joined = np.hstack([np.tile(np.arange(number), (2, 1)), *(point.joined_pairs() for point in points)])
     label = components(joined[0], joined[1], number)
     place = np.full(number, -1)
     place[own[own >= 0]] = np.flatnonzero(own >= 0)

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import numpy as np
 from sysdyn.runtime import tuning
-from sysdyn.runtime.model.scales import balanced
+from sysdyn.runtime.model.scales import balanced_sizes
 from sysdyn.runtime.model.system import System
 from sysdyn.runtime.start.start import ConsistentState
 from sysdyn.runtime.structure.structure import Structure, null_place
@@ -20,7 +20,7 @@ BESIDE = tuning.UNSEEN
 """Of its size, how far beside: a slope there is no round-off, and the exponential of a diode notices little."""
 
 
-def undetermined(system: System, state: ConsistentState, facts: Structure) -> tuple[str, ...]:
+def undetermined_implicits(system: System, state: ConsistentState, facts: Structure) -> tuple[str, ...]:
     """Implicit unknowns that a null vector of the pencil moves at the state, and none where these are others; system:
     the form as written.
     """
@@ -38,6 +38,6 @@ def undetermined(system: System, state: ConsistentState, facts: Structure) -> tu
     open_ = null_place(system, *slopes)[0]
     mine = [k for k in implicit.tolist() if system.name(k) in open_]
     beside = y.copy()
-    beside[mine] += BESIDE * balanced(system, clean, system.jacobian(state.t, clean, yd)[0])[mine]
+    beside[mine] += BESIDE * balanced_sizes(system, clean, system.jacobian(state.t, clean, yd)[0])[mine]
     left = null_place(system, *system.jacobian(state.t, beside, yd))[0] if mine else ()
     return tuple(name for name in map(system.name, mine) if name not in left)

@@ -18,7 +18,7 @@ from sysdyn.runtime import tuning
 from sysdyn.runtime.model.description import Floats, Ints
 from sysdyn.runtime.model.switches import Switches
 from sysdyn.runtime.model.system import System
-from sysdyn.runtime.numerics.rank import decomposed
+from sysdyn.runtime.numerics.rank import singular_decomposition
 from sysdyn.runtime.start.start import ConsistentState
 from sysdyn.runtime.structure.redundancy import nearby, reactions
 
@@ -42,7 +42,7 @@ def null_space(system: System, t: float, y: Floats, yd: Floats, number: int) -> 
     np.add.at(matrix, (found.which, row), found.value)
     if not np.isfinite(matrix).all():
         return None
-    left, sigma, _ = decomposed(matrix)
+    left, sigma, _ = singular_decomposition(matrix)
     rank = len(matrix) - number
     sigma = np.append(sigma, np.zeros(len(matrix)))
     return left[:, rank:] if rank == 0 or sigma[rank] <= APART * sigma[rank - 1] else None
@@ -81,4 +81,4 @@ def following(system: System, state: ConsistentState, number: int) -> System | N
     fresh: dict[str, Any] = {"layouts": {}, "alive": WeakValueDictionary(), "room": [], "systems": None}
     description = replace(system.description, switches=Switches(places, redundant=True), **fresh)
     description.switches.set(~np.isin(np.flatnonzero(members), chosen(start)))
-    return System.of(description, system.carrier, system.form.name)
+    return System.from_description(description, system.carrier, system.form.name)

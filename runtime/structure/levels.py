@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 from sysdyn.runtime.model.patterns import Pattern
 from sysdyn.runtime.model.system import System
-from sysdyn.runtime.numerics.matching import matched
+from sysdyn.runtime.numerics.matching import match_rows
 
 LARGE = 4000
 """Unknowns beyond which the paths are not sought."""
@@ -26,7 +26,7 @@ _ALWAYS = ("dynamics", "momentum_rate", "gamma", "lambda")
 Longs = NDArray[np.int64]
 
 
-def undifferentiated(system: System) -> tuple[int, ...] | None:
+def undifferentiated_families(system: System) -> tuple[int, ...] | None:
     """Row families of constraints that stand as they are, ascending; None where balances would have to be
     differentiated, or the model is too large.
     """
@@ -34,7 +34,7 @@ def undifferentiated(system: System) -> tuple[int, ...] | None:
         return None
     rows = _Rows(system.another("settled"))
     while True:
-        failed = rows.unmatched()
+        failed = rows.unmatched_equations()
         if not failed:
             return rows.as_they_are()
         if not rows.differentiate(failed):
@@ -77,13 +77,13 @@ class _Rows:
         take = rates | (mine & in_y & (self._plain | (self._flow & ~moved[column])))
         return number[row[take]], column[take].astype(np.int64)
 
-    def unmatched(self) -> set[int]:
+    def unmatched_equations(self) -> set[int]:
         """Equations on the alternating paths of those for which no unknown is left."""
         equation, unknown = self._entries_now()
         order, unknowns = np.lexsort((unknown, equation)), self._sizes[1]
         first = np.searchsorted(equation[order], np.arange(self.level.size + 1))
         pattern = Pattern(unknowns, self.level.size, first.astype(np.int32), unknown[order].astype(np.int32))
-        own = matched(pattern)
+        own = match_rows(pattern)
         met, grown = own < 0, True
         while grown:
             known = np.zeros(unknowns + 1, dtype=bool)  # the last: of those without an unknown

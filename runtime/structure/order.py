@@ -13,7 +13,7 @@ import numpy as np
 from sysdyn.runtime import tuning
 from sysdyn.runtime.model.description import Floats
 from sysdyn.runtime.model.system import System
-from sysdyn.runtime.numerics.equilibrate import equilibrated
+from sysdyn.runtime.numerics.equilibrate import equilibrate
 from sysdyn.runtime.numerics.rank import TOLERANCE, null_space, singular_values
 from sysdyn.runtime.start.start import ConsistentState
 from sysdyn.runtime.start.starter import Mask, Starter
@@ -32,7 +32,7 @@ def order_and_manifold(system: System, state: ConsistentState, idle: AbstractSet
     if full is None:
         return None
     full = full[starter.every & ~starter.groups("initial")]
-    whole, kinds = _graded(full), system.kinds
+    whole, kinds = _graded_rank(full), system.kinds
     _, jyd = system.jacobian(state.t, state.y, state.yd)
     moving = np.isin(kinds, ("q", "p", "s")) | ((kinds == "f") & system.differential(jyd))
     families = system.description.families
@@ -42,7 +42,7 @@ def order_and_manifold(system: System, state: ConsistentState, idle: AbstractSet
     def directions(of: Mask) -> int:
         """The dimension of the tangent space less that of its part in which these unknowns rest."""
         rest = np.append(~of, np.ones(full.shape[1] - of.size, dtype=bool))
-        return int(of.sum()) - whole + _graded(full[:, rest])
+        return int(of.sum()) - whole + _graded_rank(full[:, rest])
 
     return directions(content), directions(moving)
 
@@ -68,7 +68,7 @@ def _tangent(starter: Starter, state: ConsistentState, rows: Mask, free: Mask) -
     full = _rows(starter, state)
     if full is None:
         return None
-    null = null_space(*equilibrated(full[rows][:, free]))
+    null = null_space(*equilibrate(full[rows][:, free]))
     tangent = np.zeros((free.size, null.shape[1]))
     tangent[free] = null
     return tangent
@@ -89,7 +89,7 @@ def _rank(part: Floats) -> int:
     return int((singular_values(part) > TOLERANCE).sum()) if part.size else 0
 
 
-def _graded(matrix: Floats) -> int:
+def _graded_rank(matrix: Floats) -> int:
     """Rank whatever the ratios of its entries: those of a resistor of 0.1 mohm beside a capacitor, in rows and their
     derivatives, are powers of 1e8, and no scaling of lines makes them alike.
 

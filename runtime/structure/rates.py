@@ -33,7 +33,7 @@ def unique(system: System, jyd: Floats) -> NDArray[np.bool_]:
     return np.isin(np.arange(system.unknowns), column) if free is None else ~free
 
 
-def determined(system: System, start: ConsistentState) -> NDArray[np.bool_]:
+def determined_rates(system: System, start: ConsistentState) -> NDArray[np.bool_]:
     """[observed]: elements of block observe whose derivative follows from the equations."""
     y, yd = start.for_form(system)
     jyd = system.slopes(start.t, y, yd, rate=True)

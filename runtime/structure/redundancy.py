@@ -17,7 +17,7 @@ from sysdyn.runtime import tuning
 from sysdyn.runtime.model import core_library as lib
 from sysdyn.runtime.model.description import Floats, Ints
 from sysdyn.runtime.model.patterns import Places, compress
-from sysdyn.runtime.model.scales import balanced
+from sysdyn.runtime.model.scales import balanced_sizes
 from sysdyn.runtime.model.system import System
 from sysdyn.runtime.numerics.equilibrate import sparse_factors
 from sysdyn.runtime.numerics.gauss_newton import solve
@@ -103,10 +103,10 @@ def dependent(found: Reactions) -> Ints:
     left = lib.core.sd_peel(m, found.rows, found.value.size, *entries, PIVOT, lib.pointer(peeled))
     if left < 0:
         raise MemoryError
-    return np.flatnonzero(_combined(found, own) == own).astype(np.int32) if left else NONE
+    return np.flatnonzero(_vanishing_combinations(found, own) == own).astype(np.int32) if left else NONE
 
 
-def _combined(found: Reactions, weights: Floats) -> Floats:
+def _vanishing_combinations(found: Reactions, weights: Floats) -> Floats:
     """Coefficients [multipliers] with which rows of J vanish: of rows that depend on those before them as given, of the
     others such that these make up for them.  J^T is eliminated in the order written: there they have no pivot.
     """
@@ -128,7 +128,7 @@ def _moves(system: System, state: ConsistentState) -> tuple[Floats, Floats]:
     slope = np.where(
         system.of_groups("phi")[system.pattern.row], system.slopes(state.t, state.y, state.yd, rate=False), 0.0
     )
-    size = balanced(system, state.y, slope) * system.are("q")
+    size = balanced_sizes(system, state.y, slope) * system.are("q")
     return size, size * system.once_if_small(("directions", size.size), lambda: normal(POINTS, size.size))
 
 
@@ -149,7 +149,7 @@ def nearby(system: System, state: ConsistentState) -> list[Floats]:
     return found
 
 
-def vanished(system: System, state: ConsistentState) -> Ints:
+def vanishing_constraints(system: System, state: ConsistentState) -> Ints:
     """Constraints (places in `multipliers`) whose row of J is zero at the state and not beside it: there the
     configuration is singular.  Beside: at seeded points that are not brought back onto phi, where a row that can be
     zero on phi alone (a circle of radius 0) has its size.
@@ -177,5 +177,5 @@ def combination(found: Reactions, left: Ints) -> Floats:
     """
     weights = np.zeros(found.multipliers.size)
     weights[left] = 1.0 + uniform(left.size)
-    weights = _combined(found, weights) * found.scale
+    weights = _vanishing_combinations(found, weights) * found.scale
     return np.asarray(weights / weights[np.argmax(np.abs(weights))])

@@ -18,14 +18,14 @@ from sysdyn.runtime.model import core_library as lib
 from sysdyn.runtime.model.description import Floats, Ints
 from sysdyn.runtime.model.failures import RowLabel
 from sysdyn.runtime.model.held_rows import multiplier_row
-from sysdyn.runtime.model.scales import balanced
+from sysdyn.runtime.model.scales import balanced_sizes
 from sysdyn.runtime.model.system import LARGE, System
-from sysdyn.runtime.numerics.equilibrate import equilibrated, sparse_factors
+from sysdyn.runtime.numerics.equilibrate import equilibrate, sparse_factors
 from sysdyn.runtime.numerics.ordering import net_order_of
 from sysdyn.runtime.numerics.points import normal
-from sysdyn.runtime.numerics.rank import CERTAIN, TOLERANCE, count, decomposed, singular_values
+from sysdyn.runtime.numerics.rank import CERTAIN, TOLERANCE, count, singular_decomposition, singular_values
 from sysdyn.runtime.start.start import ConsistentState
-from sysdyn.runtime.structure.redundancy import combination, dependent, nearby, reactions, vanished
+from sysdyn.runtime.structure.redundancy import combination, dependent, nearby, reactions, vanishing_constraints
 from sysdyn.values import dataclass
 
 DENSE = tuning.DENSE
@@ -92,10 +92,10 @@ def _rows_to_one(a: Floats, b: Floats) -> tuple[Floats, Floats]:
 
 def pencil_index(e: Floats, b: Floats) -> int | None:
     """Index of e x' + b x = 0 [n, n]; None where the pencil is singular (or the index above MAX_INDEX)."""
-    e, b = equilibrated(e, b)
+    e, b = equilibrate(e, b)
     n = e.shape[0]
     for index in range(MAX_INDEX + 1):
-        u, sigma, _ = decomposed(e)
+        u, sigma, _ = singular_decomposition(e)
         rank = count(sigma) if sigma.max(initial=0.0) > TOLERANCE else 0
         if rank == n:
             return index
@@ -113,8 +113,8 @@ def null_vectors(e: Floats, b: Floats) -> tuple[Floats, Floats]:
 
     A singular pencil is singular at every cj; a regular one whose entries lie far apart is badly scaled at most.
     """
-    e, b = equilibrated(e, b)
-    u, sigma, vt = decomposed(b + GENERIC * e)
+    e, b = equilibrate(e, b)
+    u, sigma, vt = singular_decomposition(b + GENERIC * e)
     rank = count(sigma, CERTAIN)
     if rank < sigma.size and any(_regular(b + cj * e) for cj in POINTS):
         rank = sigma.size
@@ -122,7 +122,7 @@ def null_vectors(e: Floats, b: Floats) -> tuple[Floats, Floats]:
 
 
 def _regular(matrix: Floats) -> bool:
-    sigma = singular_values(equilibrated(matrix)[0])
+    sigma = singular_values(equilibrate(matrix)[0])
     return count(sigma, CERTAIN) == sigma.size
 
 
@@ -208,10 +208,10 @@ def _place(system: System, multiplier: int) -> tuple[int, int]:
 def _label(system: System, multiplier: int) -> RowLabel:
     """Label of the constraint of a multiplier."""
     family, position = _place(system, multiplier)
-    return system.description.rows[multiplier_row(system.description, family)].at(position)
+    return system.description.rows[multiplier_row(system.description, family)].label_at(position)
 
 
-def _roused(system: System, t: float, jy: Floats) -> Floats:
+def _rouse_slopes(system: System, t: float, jy: Floats) -> Floats:
     """dF/dy [entries] in sizes of the unknowns, with slopes of steep laws that are nearly zero here as large as they
     are elsewhere: a diode at rest determines its voltage as well as one that conducts.
     """
@@ -251,14 +251,14 @@ def _index_beside(system: System, t: float, y: Floats, yd: Floats, undetermined:
     moved = [k for k in np.flatnonzero(system.are("e", "f")).tolist() if system.name(k) in undetermined]
     if not moved:
         return None
-    size, senses, found = balanced(system, y, system.jacobian(t, y, yd)[0])[moved], set[float](), None
+    size, senses, found = balanced_sizes(system, y, system.jacobian(t, y, yd)[0])[moved], set[float](), None
     for way in normal(WAYS, len(moved)):
         for side in (BESIDE, -BESIDE):
             beside = y.copy()
             beside[moved] += side * size * way
             found = _index_at(system, t, beside, yd)[0]
             jy, jyd = (system.dense(slopes) for slopes in system.jacobian(t, beside, yd))
-            senses.add(float(np.linalg.slogdet(equilibrated(jy + GENERIC * jyd)[0])[0]))
+            senses.add(float(np.linalg.slogdet(equilibrate(jy + GENERIC * jyd)[0])[0]))
             if found is None or len(senses) > 1:
                 return None
     return found
@@ -275,10 +275,10 @@ def _index_at(system: System, t: float, y: Floats, yd: Floats) -> tuple[int | No
         if 0 <= found <= USUAL:
             return found, ()
         least = found if found >= 0 else None
-    size = balanced(system, y, jy)[system.pattern.columns_of()]
+    size = balanced_sizes(system, y, jy)[system.pattern.columns_of()]
     undetermined: tuple[str, ...] = ()
     names: tuple[str, ...] = ()
-    looks = (jy, jyd), (jy * size, jyd * size), (_roused(system, t, jy * size), jyd * size)
+    looks = (jy, jyd), (jy * size, jyd * size), (_rouse_slopes(system, t, jy * size), jyd * size)
     for at, rates in looks[0 if least is None else 1 :]:
         names = null_place(system, at, rates)[0]
         index = None if names else pencil_index(system.dense(rates), system.dense(at))
@@ -333,7 +333,7 @@ def structure(system: System, state: ConsistentState) -> Structure:
     index, undetermined = _highest_index(system, state)
     found = reactions(system, system.slopes(state.t, *state.for_form(system), rate=False))
     left = dependent(found)
-    zero = vanished(system, state)
+    zero = vanishing_constraints(system, state)
     lowest = np.union1d(left, zero).size if zero.size else left.size
     if left.size:
         # a rank that is smaller here alone is the configuration's, not the constraints'

@@ -8,14 +8,14 @@ from collections.abc import Iterator
 from pathlib import Path
 
 from sysdyn.runtime.model.failures import TraceError
-from sysdyn.runtime.trace.interruptions import uninterrupted
+from sysdyn.runtime.trace.interruptions import defer_interruptions
 from sysdyn.runtime.trace.locks import lock as locked
 
 _OPEN = os.O_RDWR | getattr(os, "O_NOFOLLOW", 0) | getattr(os, "O_CLOEXEC", 0)  # Windows has neither
 
 
 @contextlib.contextmanager
-def claimed(path: Path) -> Iterator[None]:
+def claim_trace(path: Path) -> Iterator[None]:
     """Holds the trace at `path` (resolved) for this process.  TraceError where a living run holds it.
 
     A lock dies with its process, so a killed run leaves none; where locks do not work nothing is refused.
@@ -23,8 +23,8 @@ def claimed(path: Path) -> Iterator[None]:
     lock, handle = _lock_of(path), None
     try:
         try:
-            with uninterrupted():
-                handle = _locked(lock)
+            with defer_interruptions():
+                handle = _lock_handle(lock)
         except BlockingIOError as error:
             said = "another run is writing this trace: wait for it, or give -o another name"
             raise TraceError(f"{path}: {said}") from error
@@ -57,7 +57,7 @@ def _lock_of(path: Path) -> Path:
     return path.with_name(f".{path.name}.lock")
 
 
-def _locked(lock: Path) -> int:
+def _lock_handle(lock: Path) -> int:
     """A handle of the lock's file; that of a run which just ended may have lost its name meanwhile, then once more."""
     while True:
         handle = os.open(lock, _OPEN | os.O_CREAT, 0o600)

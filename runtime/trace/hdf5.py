@@ -136,11 +136,11 @@ def scalars(group: Any) -> dict[str, tuple[float, str]]:
         if not isinstance(data, h5d.DatasetID) or data.shape != ():
             raise TypeError(f"'{name}' is no number")
         data.read(h5s.ALL, h5s.ALL, held)
-        found[name] = float(held), _said(data, b"units", "1")
+        found[name] = float(held), _text_attribute(data, b"units", "1")
     return found
 
 
-def _said(data: Any, name: bytes, without: str) -> str:
+def _text_attribute(data: Any, name: bytes, without: str) -> str:
     """A text that is an attribute."""
     if not h5a.exists(data, name):
         return without

@@ -10,7 +10,7 @@ from types import FrameType
 
 
 @contextlib.contextmanager
-def uninterrupted() -> Iterator[None]:
+def defer_interruptions() -> Iterator[None]:
     """What ends a command (Ctrl-C, SIGTERM, SIGHUP) counts at the end of the block where Python handles it; in other
     threads than the main one there is none.
     """

@@ -15,8 +15,8 @@ from typing import Protocol
 import numpy as np
 from sysdyn.runtime.events.plan import Happened
 from sysdyn.runtime.model.description import Floats
-from sysdyn.runtime.trace.claim import claimed
-from sysdyn.runtime.trace.interruptions import uninterrupted
+from sysdyn.runtime.trace.claim import claim_trace
+from sysdyn.runtime.trace.interruptions import defer_interruptions
 from sysdyn.runtime.trace.opening import destination
 from sysdyn.runtime.trace.trace import Quantity, Trace
 from sysdyn.runtime.trace.trace_store import BEFORE, Layout, clear, input_output
@@ -42,7 +42,7 @@ class Writer(Protocol):
     def ranges(self) -> dict[str, float]:
         """Largest less least value of each stored quantity."""
 
-    def undefined(self) -> tuple[str, float] | None:
+    def first_undefined(self) -> tuple[str, float] | None:
         """The first quantity that is no number, or infinite, and when [s]."""
 
     def finish(
@@ -74,17 +74,17 @@ class Held:
 
     def seen(self) -> dict[str, float]:
         """Largest magnitude of each stored quantity."""
-        return self._taken().largest()
+        return self._taken_rows().largest()
 
     def ranges(self) -> dict[str, float]:
         """Largest less least value of each stored quantity."""
-        return self._taken().ranges()
+        return self._taken_rows().ranges()
 
-    def undefined(self) -> tuple[str, float] | None:
+    def first_undefined(self) -> tuple[str, float] | None:
         """The first quantity that is no number, or infinite, and when [s]."""
-        return self._taken().undefined
+        return self._taken_rows().undefined
 
-    def _taken(self) -> Met:
+    def _taken_rows(self) -> Met:
         """Of all rows so far: of runs that are not kept nobody asks."""
         while self._asked < len(self._rows):
             self._met.take(self._rows[self._asked])
@@ -110,7 +110,7 @@ class Held:
             )
             for c in layout.columns
         }
-        energy = Quantity("audit.energy", rows[:, 6].copy(), "J", self._taken().turned_over, None)
+        energy = Quantity("audit.energy", rows[:, 6].copy(), "J", self._taken_rows().turned_over, None)
         constraints = Quantity("audit.constraints", rows[:, 7].copy(), "1", None, None)
         data |= {"audit.energy": energy, "audit.constraints": constraints}
         known = {**layout.attributes, **attributes, "final": int(final)}
@@ -129,7 +129,7 @@ class Memory:
     path: Path | None = None
 
     @contextlib.contextmanager
-    def claimed(self) -> Iterator[None]:
+    def claim(self) -> Iterator[None]:
         """Nobody else can see it."""
         yield
 
@@ -156,14 +156,14 @@ class Files:
         self._part = self._target.with_name(f".{self._target.name}.part")
 
     @contextlib.contextmanager
-    def claimed(self) -> Iterator[None]:
+    def claim(self) -> Iterator[None]:
         """Holds the trace for this process, without what killed runs left beside it."""
-        with claimed(self._target):
+        with claim_trace(self._target):
             self._clear()
             try:
                 yield
             finally:  # of a writer that was interrupted while it was made nobody else knows
-                with uninterrupted():
+                with defer_interruptions():
                     self._clear()
 
     def _clear(self) -> None:

@@ -22,14 +22,14 @@ SMALL = 1 << 26
 """Bytes that are never too many."""
 
 
-def opened(path: str | Path, **options: Any) -> Any:
+def open_regular(path: str | Path, **options: Any) -> Any:
     """The h5py file, open for reading.  OSError where it is no regular file, or names others."""
     import h5py
 
     regular(path)
     file = h5py.File(path, "r", **options)
     try:
-        _alone(file, os.stat(path).st_size)  # noqa: PTH116
+        _verify_alone(file, os.stat(path).st_size)  # noqa: PTH116
     except BaseException:
         file.close()
         raise
@@ -96,11 +96,11 @@ def _outside_but_parameters(file: Any) -> str | None:
         inner = _outside(item, [0]) if isinstance(item, h5g.GroupID) else None
         own = kind not in (h5l.TYPE_HARD, h5l.TYPE_SOFT) or (isinstance(item, h5d.DatasetID) and _elsewhere(item))
         if inner or own:
-            return inner or _shown(name)
+            return inner or _shown_name(name)
     return None
 
 
-def _alone(file: Any, size: int) -> None:
+def _verify_alone(file: Any, size: int) -> None:
     """OSError where a link or a data set leads out of the file, or where its data sets claim far more numbers than a
     file of this size [bytes] holds; nothing is followed or read on the way.
     """
@@ -117,14 +117,14 @@ def _outside(group: Any, claimed: list[int]) -> str | None:
     from h5py import h5l, h5o
 
     def link(name: bytes, info: Any) -> str | None:
-        return None if info.type in (h5l.TYPE_HARD, h5l.TYPE_SOFT) else _shown(name)
+        return None if info.type in (h5l.TYPE_HARD, h5l.TYPE_SOFT) else _shown_name(name)
 
     def data(name: bytes, info: Any) -> str | None:
         if info.type != h5o.TYPE_DATASET:
             return None
         found = h5o.open(group, name)
         claimed[0] += int(found.get_space().get_simple_extent_npoints()) * int(found.get_type().get_size())
-        return _shown(name) if _elsewhere(found) else None
+        return _shown_name(name) if _elsewhere(found) else None
 
     linked: str | None = group.links.visit(link, info=True)
     stored: str | None = linked or h5o.visit(group, data, info=True)
@@ -139,5 +139,5 @@ def _elsewhere(data: Any) -> bool:
     return bool(layout.get_layout() == h5d.VIRTUAL or layout.get_external_count())
 
 
-def _shown(name: bytes) -> str:
+def _shown_name(name: bytes) -> str:
     return name.decode("utf-8", "replace")

@@ -17,7 +17,7 @@ from sysdyn.names import trace_name
 from sysdyn.runtime.events.plan import Happened
 from sysdyn.runtime.model.description import Floats
 from sysdyn.runtime.model.failures import TraceError
-from sysdyn.runtime.trace.opening import of_sweep, opened
+from sysdyn.runtime.trace.opening import of_sweep, open_regular
 from sysdyn.runtime.trace.trace_store import BEFORE, Column, Layout, Store, TraceParameter, columns_of, input_output
 from sysdyn.values import dataclass
 
@@ -63,7 +63,7 @@ class Quantity(NDArrayOperatorsMixin):
 
 
 @contextlib.contextmanager
-def _damaged(path: Path) -> Iterator[None]:
+def _raise_trace_errors(path: Path) -> Iterator[None]:
     """What h5py raises of a file whose layout makes no sense as TraceError."""
     try:
         yield
@@ -110,7 +110,7 @@ class Trace:
         from sysdyn.runtime.trace.hdf5 import scalars
 
         path = Path(file)
-        with _damaged(path), input_output(path), opened(path) as source:
+        with _raise_trace_errors(path), input_output(path), open_regular(path) as source:
             data = {name: item for name, item in source.items() if isinstance(item, h5py.Dataset)}
             if "time" not in data:
                 raise ValueError("no data set 'time': not a trace")

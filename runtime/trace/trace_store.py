@@ -70,8 +70,8 @@ def columns_of(description: Description) -> tuple[Column, ...]:
         row = description.rows[k]
         for position in range(row.size):
             if row.stored:
-                name = trace_name(row.named(position))
-                label = row.named(position, row.label)
+                name = trace_name(row.name_of(position))
+                label = row.name_of(position, row.label)
                 found.append(Column(name, place, row.unit, label, row.rate))
             place += 1
     return tuple(found)
@@ -128,7 +128,7 @@ def _most() -> float:
 
 
 @contextlib.contextmanager
-def _unlimited() -> Iterator[None]:
+def _raise_file_limit() -> Iterator[None]:
     """Files may have what the hard limit lets them have."""
     try:
         import resource
@@ -270,7 +270,7 @@ class Store:
         if self._closed:
             return
         self._closed = True
-        with _unlimited():
+        with _raise_file_limit():
             with contextlib.suppress(Exception):
                 handle = self._file.id.get_vfd_handle()
                 copy = os.memfd_create("sysdyn-trace")

@@ -19,7 +19,7 @@ from sysdyn.runtime import tuning
 from sysdyn.runtime.events.plan import Happened
 from sysdyn.runtime.model.description import Floats
 from sysdyn.runtime.model.failures import TraceError
-from sysdyn.runtime.trace.interruptions import uninterrupted
+from sysdyn.runtime.trace.interruptions import defer_interruptions
 from sysdyn.runtime.trace.opening import destination
 from sysdyn.runtime.trace.trace_store import BEFORE, Column, Layout, Store, input_output
 
@@ -133,7 +133,7 @@ class TraceWriter:
         """Largest less least value of each stored quantity."""
         return self._met.ranges()
 
-    def undefined(self) -> tuple[str, float] | None:
+    def first_undefined(self) -> tuple[str, float] | None:
         """The first quantity that is no number, or infinite, and when [s]."""
         return self._met.undefined
 
@@ -148,10 +148,10 @@ class TraceWriter:
 
         An interruption waits until that is done: half of it would be written twice.
         """
-        with uninterrupted():
-            self._turned(last, events)
+        with defer_interruptions():
+            self._turned_rows(last, events)
 
-    def _turned(self, last: Mapping[str, Mapping[str, Any]] | None, events: Sequence[Happened]) -> None:
+    def _turned_rows(self, last: Mapping[str, Mapping[str, Any]] | None, events: Sequence[Happened]) -> None:
         new, self._waiting, self._numbers = self._waiting, [], 0
         try:
             with input_output(self.path):

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from linearized import ALL, CLOSE, PRIMAL, RLC, linear, values
 from sysdyn.runtime.linear import tangent
-from sysdyn.runtime.numerics.rank import decomposed
+from sysdyn.runtime.numerics.rank import singular_decomposition
 from texts import ROOT, run_json, write
 
 NETWORKS = 200 if os.environ.get("SYSDYN_LONG") else 12
@@ -188,7 +188,11 @@ def test_a_flow_that_is_given_hides_no_balance(formulation, tmp_path, capsys):
 def test_a_long_ladder_takes_no_singular_vectors(capsys, monkeypatch):
     """Of 575 unknowns and rates: factors leave no doubt of what rows determine.  Its modes by a closed form."""
     cells, asked = 72, []
-    monkeypatch.setattr(tangent, "decomposed", lambda matrix: (asked.append(min(matrix.shape)), decomposed(matrix))[1])
+    monkeypatch.setattr(
+        tangent,
+        "singular_decomposition",
+        lambda matrix: (asked.append(min(matrix.shape)), singular_decomposition(matrix))[1],
+    )
     path = ROOT / "models" / "benchmark" / "rc_ladder.sd"
     found = values(linear(capsys, path, "--set", f"n={cells}")["eigenvalues"])
     odd = 2.0 * np.arange(1, cells + 1) - 1.0

@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 from sysdyn.cli.failures import classify, worst
 from sysdyn.cli.main import run
-from sysdyn.runtime.trace.claim import claimed
+from sysdyn.runtime.trace.claim import claim_trace
 from texts import BROKEN, ENDLESS, PENDULUM, process, write
 
 DRIVEN = """\
@@ -156,7 +156,7 @@ def _begun(model):
 
 
 def test_one_sweep_at_a_time_writes_a_file(model, capsys):
-    with claimed(Path("runs.h5").resolve()):
+    with claim_trace(Path("runs.h5").resolve()):
         assert run(["sweep", "-q", model, *OVER, "-o", "runs.h5"]) == 5
     assert "another run is writing" in capsys.readouterr().err
     assert run(["sweep", "-q", model, *OVER, "-o", "runs.h5"]) == 0

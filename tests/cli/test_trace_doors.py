@@ -15,7 +15,7 @@ import pytest
 from sysdyn.cli.main import run
 from sysdyn.cli.sweep.sweep_results import Sweep
 from sysdyn.runtime.model.failures import TraceError
-from sysdyn.runtime.trace.claim import claimed
+from sysdyn.runtime.trace.claim import claim_trace
 from sysdyn.runtime.trace.opening import replaceable
 from sysdyn.runtime.trace.trace import Trace
 from texts import ENDLESS, PENDULUM, write
@@ -281,7 +281,7 @@ def test_a_trace_that_cannot_be_read_while_it_is_written_is_held_by_its_run(tmp_
     torn = tmp_path / "out.h5"
     torn.write_bytes(b"\x89HDF\r\n\x1a\n, torn")
     assert not replaceable(torn)
-    with claimed(torn):
+    with claim_trace(torn):
         assert replaceable(torn)
     assert not replaceable(torn)
 

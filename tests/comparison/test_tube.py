@@ -15,7 +15,7 @@ from sysdyn.runtime.comparison.curve import (
     whole_cells,
     with_extrema,
 )
-from sysdyn.runtime.comparison.thinning import estimated_rates, rounded, thinned
+from sysdyn.runtime.comparison.thinning import estimated_rates, round_to_step, thin_rows
 from sysdyn.runtime.comparison.tube import band
 from sysdyn.runtime.comparison.verdict import Tolerance
 
@@ -148,7 +148,7 @@ def test_thinning_keeps_within_its_limit():
     t = np.linspace(0.0, 10.0, 3001)
     curves = [Curve(t, np.sin(3.0 * t), 3.0 * np.cos(3.0 * t)), Curve(t, np.abs(np.sin(t)))]
     limits = np.array([1e-4, 1e-3])
-    kept = thinned(curves, limits)
+    kept = thin_rows(curves, limits)
     assert 20 < kept.size < 400
     assert kept[0] == 0
     assert kept[-1] == t.size - 1
@@ -169,8 +169,8 @@ def test_estimated_rates_leave_kinks_alone():
 
 def test_rounded_is_within_half_a_step():
     values = np.random.default_rng(1).standard_normal(1000)
-    assert np.max(np.abs(rounded(values, 1e-3) - values)) <= 0.5e-3
-    assert np.array_equal(rounded(values, 0.0), values)
+    assert np.max(np.abs(round_to_step(values, 1e-3) - values)) <= 0.5e-3
+    assert np.array_equal(round_to_step(values, 0.0), values)
 
 
 def test_what_is_no_number_stands_beside_the_number_of_the_other():

@@ -21,13 +21,13 @@ def test_parts_are_remembered_apart():
     memory = _of_two_parts()
     off, first, both = (0, 0, 0, 0, 0, 0), (1, 0, 0, 0, 0, 1), (1, 1, 0, 0, 0, 1)
     memory.learn(off, [0], first)
-    assert memory.followed(off, [0]) == first
-    assert memory.followed(off, [1]) is None
+    assert memory.recall(off, [0]) == first
+    assert memory.recall(off, [1]) is None
     memory.learn(first, [1], both)
-    assert memory.followed(off, [0, 1]) == both
-    assert memory.followed((0, 1, 0, 0, 0, 0), [0]) is None  # with that part untouched, as it stands
+    assert memory.recall(off, [0, 1]) == both
+    assert memory.recall((0, 1, 0, 0, 0, 0), [0]) is None  # with that part untouched, as it stands
     memory.learn((0, 1, 0, 0, 0, 0), [], (0, 1, 0, 0, 0, 0))
-    assert memory.followed((0, 1, 0, 0, 0, 0), [0]) == both
+    assert memory.recall((0, 1, 0, 0, 0, 0), [0]) == both
 
 
 BUCKS = """

@@ -98,11 +98,11 @@ def test_what_is_left_of_a_node(tmp_path, monkeypatch, text, left, formulation):
     met = []
 
     def watched(system, t, y, yd):
-        found = condensing.condensed(system, t, y, yd)
+        found = condensing.condense_model(system, t, y, yd)
         met.append((found, t, y.copy(), yd.copy()))
         return found
 
-    monkeypatch.setattr(integrate, "condensed", watched)
+    monkeypatch.setattr(integrate, "condense_model", watched)
     trace_of(tmp_path, text, formulation=formulation, method="radau")
     forms, t, y, yd = met[-1]
     assert forms.stepped.unknowns < left * N
@@ -136,10 +136,10 @@ def test_the_matrix_of_a_circuit_is_the_slope_of_its_rows(tmp_path, monkeypatch)
     met = []
 
     def watched(system, t, y, yd):
-        met.append((condensing.condensed(system, t, y, yd), t))
+        met.append((condensing.condense_model(system, t, y, yd), t))
         return met[-1][0]
 
-    monkeypatch.setattr(integrate, "condensed", watched)
+    monkeypatch.setattr(integrate, "condense_model", watched)
     nodes = ", ".join(f"{letter}{k}" for k in range(1, 6) for letter in "abc")
     cells = "".join(CELL.format(k=k, before=f"b{k - 1}" if k > 1 else "v") for k in range(1, 6))
     trace_of(tmp_path, LUMPED % (nodes, cells), formulation="lagrangian", method="bdf")
@@ -298,7 +298,7 @@ def _after_jump(matrix, drive):
 def test_pieces_between_kinks_and_jumps_are_condensed(tmp_path, monkeypatch, source, exact, method):
     """One unknown a node on both sides of it; no structure of all unknowns is made where no state jumps."""
     seen, whole = [], []
-    made, settled = integrate.Integration._condensed, settlers.Settlers.of
+    made, settled = integrate.Integration._condense, settlers.Settlers.settler_of
 
     def watched(self):
         found = made(self)
@@ -309,8 +309,8 @@ def test_pieces_between_kinks_and_jumps_are_condensed(tmp_path, monkeypatch, sou
         whole.append(asked.get("whole"))
         return settled(self, *rows, **asked)
 
-    monkeypatch.setattr(integrate.Integration, "_condensed", watched)
-    monkeypatch.setattr(settlers.Settlers, "of", counted)
+    monkeypatch.setattr(integrate.Integration, "_condense", watched)
+    monkeypatch.setattr(settlers.Settlers, "settler_of", counted)
     trace = trace_of(tmp_path, LADDER.replace("1 V*sin(5 rad/s*t)", source), method=method)
     c, r = _capacitors(), (1.0 + np.arange(1, N + 1) / N) / N
     flow = np.diag(1.0 / r) @ (np.eye(N, k=-1) - np.eye(N))

@@ -281,7 +281,7 @@ def test_what_the_core_tells_of_a_transition_is_what_the_handler_tells():
     assigned = Assignment("g", "discrete", 0, 0), Assignment("h", "discrete", 1, 1)
     entry, other = Happened(0.0, "when x < 0", "", "", ""), Happened(0.0, "D1", "D1.one_way", "free", "holds")
     told = told_of((assigned,), (entry, other))
-    assert told.at(2.5, [1.0, 2.0, 3.0, 4.0]) == [
+    assert told.entries_at(2.5, [1.0, 2.0, 3.0, 4.0]) == [
         Happened(2.5, "when x < 0", "", "g = 1, h = 3", "g = 2, h = 4"),
         Happened(2.5, "D1", "D1.one_way", "free", "holds"),
     ]

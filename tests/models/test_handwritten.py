@@ -15,7 +15,7 @@ from sysdyn.dsl import load
 from sysdyn.dsl.model.expression import fresh
 from sysdyn.dsl.text.diagnostics import ModelError, Report
 from sysdyn.dsl.text.source import SourceText
-from sysdyn.runtime.condense.condenser import condensed
+from sysdyn.runtime.condense.condenser import condense_model
 from sysdyn.runtime.model import carrier
 from sysdyn.runtime.model.system import System
 
@@ -180,7 +180,7 @@ def test_a_chain_of_scalars_leaves_no_full_matrix():
         arrays = Prepared.arrays_of(binding)
         system = System(model.manifest(binding), arrays, carrier.load(module_of(model.text)))
         zero = np.zeros(system.unknowns)
-        found = condensed(system, 0.0, zero, zero)
+        found = condense_model(system, 0.0, zero, zero)
         return found.stepped._share.size
 
     few, many = terms(50), terms(100)

@@ -5,7 +5,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from sysdyn.runtime.events.bounces import thrown
+from sysdyn.runtime.events.bounces import is_thrown
 from sysdyn.runtime.events.conditions import holds
 from sysdyn.runtime.events.pivoting import NoActiveSetError, Pivoting
 
@@ -150,8 +150,8 @@ def test_conditions_are_joined():
 
 def test_a_gap_that_is_thrown_open_rises_and_closes_again():
     """h = v^2/(2 g), T = 2 v/g; where nothing pulls it back it does not close."""
-    bounce = thrown(2.0, 1e-12, 3.0, 9.81)
+    bounce = is_thrown(2.0, 1e-12, 3.0, 9.81)
     assert (bounce.height, bounce.flight) == (pytest.approx(9.0 / 19.62), pytest.approx(6.0 / 9.81))
     assert (bounce.level, bounce.begins) == (0.0, 2.0)
-    assert thrown(2.0, -1e-12, 3.0, 0.0).flight == np.inf
-    assert thrown(2.0, -1e-12, 3.0, 0.0).level == -1e-12
+    assert is_thrown(2.0, -1e-12, 3.0, 0.0).flight == np.inf
+    assert is_thrown(2.0, -1e-12, 3.0, 0.0).level == -1e-12

@@ -7,12 +7,12 @@ import numpy as np
 import pytest
 import small_models as models
 from sysdyn.runtime.events.locate import Edges, crossing
-from sysdyn.runtime.linear.pencil import motions, parted, surely_parted, widely_parted
+from sysdyn.runtime.linear.pencil import motions, reduce_pencil, surely_parted, widely_parted
 from sysdyn.runtime.linear.stability import Energy, energy_at, verdict
 from sysdyn.runtime.linear.states import pivots, rank_of, unseen
 from sysdyn.runtime.linear.tangent import NoLinearisation, Reduced
 from sysdyn.runtime.model.carrier import load
-from sysdyn.runtime.model.description import stated
+from sysdyn.runtime.model.description import statements
 from sysdyn.runtime.model.held_rows import held_rows, switch_rows
 from sysdyn.runtime.model.switches import Switches
 from sysdyn.runtime.model.system import System
@@ -93,7 +93,7 @@ def test_a_capacitor_behind_a_resistor_has_one_motion():
     """v' = (u - v)/(R C), i = (u - v)/R."""
     matrices = capacitor(R)
     spaces = motions(*matrices[:2])
-    found = parted(matrices, np.array([0]), spaces, ("v",))
+    found = reduce_pencil(matrices, np.array([0]), spaces, ("v",))
     assert spaces[0].shape == (2, 1)
     for part, expected in (
         (found.a, -1.0 / (R * C)),
@@ -110,7 +110,7 @@ def test_a_capacitor_across_a_source_follows_its_rate():
     """i = C u': index 2, no motion."""
     matrices = capacitor(0.0)
     spaces = motions(*matrices[:2])
-    found = parted(matrices, np.zeros(0, dtype=np.int64), spaces, ())
+    found = reduce_pencil(matrices, np.zeros(0, dtype=np.int64), spaces, ())
     assert spaces[0].shape == (2, 0)
     assert found.d1.item() == pytest.approx(C, rel=1e-14)
     assert abs(found.d.item()) < 1e-14
@@ -272,7 +272,7 @@ def test_a_fixed_value_goes_before_a_guess_of_the_same():
     said = [([0, 1], [1.0, 2.0], True), ([1, 2], [5.0, 6.0], False)]
     initial = tuple(SimpleNamespace(family=1, positions=np.array(p), values=np.array(v), fixed=f) for p, v, f in said)
     for order in (initial, initial[::-1]):
-        values, _, written = stated(np.array([0, 2], dtype=np.int32), 6, order)
+        values, _, written = statements(np.array([0, 2], dtype=np.int32), 6, order)
         assert values.tolist() == [0.0, 0.0, 1.0, 2.0, 6.0, 0.0]
         assert written.tolist() == [False, False, True, True, True, False]
 

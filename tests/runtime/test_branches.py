@@ -85,7 +85,7 @@ def test_branches_that_contradict_each_other_are_told_by_name():
     with pytest.raises(NoBranchError, match=r"v > 0 \(brake\)") as told:
         found.turn(values(0.0, -1.0))
     assert not told.value.pushed
-    found.anew()
+    found.begin_instant()
     assert found.turn(values(1.0)) or found.state() == [ABOVE]
 
 
@@ -99,8 +99,8 @@ def test_a_jump_off_the_surface_ends_a_slide():
 
 def test_what_has_changed_is_told_in_words():
     found = kinks(ABOVE)
-    assert found.happened(2.0, [BELOW]) == [Happened(2.0, "v > 0", "brake", "< 0", "> 0")]
-    assert found.happened(2.0, [ABOVE]) == []
+    assert found.changes(2.0, [BELOW]) == [Happened(2.0, "v > 0", "brake", "< 0", "> 0")]
+    assert found.changes(2.0, [ABOVE]) == []
 
 
 def test_a_plan_of_nothing_happens_not_at_all():
@@ -122,10 +122,10 @@ def test_pairs_whose_difference_lies_in_a_span():
 
 def test_what_of_a_span_vanishes_in_some_rows():
     vectors = np.array([[1.0, 1.0], [1.0, -1.0], [0.0, 2.0]])
-    left = mates._without(vectors, np.array([False, False, True]))
+    left = mates._null_span(vectors, np.array([False, False, True]))
     assert left.shape == (3, 1)
     assert np.abs(left[:, 0]) == pytest.approx([1.0, 1.0, 0.0])
-    assert mates._without(vectors, np.zeros(3, dtype=bool)) is vectors
+    assert mates._null_span(vectors, np.zeros(3, dtype=bool)) is vectors
 
 
 def test_a_contact_alone_has_no_mate():

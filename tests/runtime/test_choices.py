@@ -104,7 +104,7 @@ def said(model):
     document = text.document(SourceText("m.sd", model), report)
     network = text.network(document, document.models["m"], document.scenes["s"], report)
     made = prepare(network, report, backend="numpy")
-    system = System.of(describe(made.manifest, made.arrays), made.carrier, "3")
+    system = System.from_description(describe(made.manifest, made.arrays), made.carrier, "3")
     return system, consistent_start(system, 0.0)
 
 
@@ -278,7 +278,7 @@ def test_the_explicit_method_goes_on_once_where_radau_takes_more_steps(monkeypat
             raise SolverFailure("max_steps", 0.5, 1e-3)
         return SimpleNamespace(met=True)
 
-    monkeypatch.setattr(controlled, "_achieved", achieved)
+    monkeypatch.setattr(controlled, "_run_one_method", achieved)
     plain = SimpleNamespace(form=SimpleNamespace(scales=()))
     ways = [Way(method, plain, 1, "0") for method in ("dopri", "radau", "bdf")]
     runs = Taken(ways[0])

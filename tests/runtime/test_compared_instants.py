@@ -5,14 +5,14 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from sysdyn.runtime.accuracy import fronts
-from sysdyn.runtime.accuracy.common_instants import MANY, MOST, Thinned, common, joined, known, late_by
+from sysdyn.runtime.accuracy.common_instants import MANY, MOST, Thinned, common, join_instants, known_instants, late_by
 from sysdyn.runtime.accuracy.options import Options, WrongOption, instants
-from sysdyn.runtime.accuracy.pairs import Sampled, apart, difference
+from sysdyn.runtime.accuracy.pairs import Sampled, difference, distance_of_runs
 from sysdyn.runtime.integrate.request import COMPARED, TRACE
 from sysdyn.runtime.integrate.rows.ledgers import Balance
 from sysdyn.runtime.integrate.weights.round_off import LeftOpen
 from sysdyn.runtime.integrate.weights.unknown_roles import Roles, without_rate
-from sysdyn.runtime.judgement import Estimate, allowed, cancelled, judge
+from sysdyn.runtime.judgement import Estimate, allowed_share, cancelling_quantities, judge
 from sysdyn.runtime.model.failures import RowLabel
 
 
@@ -43,12 +43,12 @@ def test_a_long_stream_is_thinned_evenly_whatever_its_chunks(chunk):
 
 
 def test_instants_are_known_where_the_trace_has_an_interval():
-    assert known(np.arange(10.0), Options(None, 0.0, 9.0), 1) is None
+    assert known_instants(np.arange(10.0), Options(None, 0.0, 9.0), 1) is None
     asked, options = np.linspace(0.0, 1.0, 1201), Options(None, 0.0, 1.0, every=1 / 1200)
-    assert np.array_equal(known(asked, options, 1), asked)
-    many = known(asked, options, 4000)
+    assert np.array_equal(known_instants(asked, options, 1), asked)
+    many = known_instants(asked, options, 4000)
     assert many.size == 401  # every third, the last among them
-    few = known(np.array([2.0, 3.1, 4.0]), Options(None, 2.0, 4.0, every=2.0, at=(3.1,)), 1)
+    few = known_instants(np.array([2.0, 3.1, 4.0]), Options(None, 2.0, 4.0, every=2.0, at=(3.1,)), 1)
     assert few.size == MOST + 2
     assert 3.1 in few  # what is asked for is compared
     assert few[-1] == 4.0
@@ -95,7 +95,7 @@ def test_of_two_rows_at_one_instant_the_former_is_kept():
 
 
 def test_instants_of_both_kinds_are_one():
-    every, kinds = joined(np.array([0.0, 1.0]), np.array([TRACE, TRACE]), np.array([0.5, 1.0]))
+    every, kinds = join_instants(np.array([0.0, 1.0]), np.array([TRACE, TRACE]), np.array([0.5, 1.0]))
     assert every.tolist() == [0.0, 0.5, 1.0]
     assert kinds.tolist() == [TRACE, COMPARED, TRACE | COMPARED]
 
@@ -123,11 +123,11 @@ def balance(value, turnover=2.0, kind="energy", passed=1.0, risen=()):
 
 
 def test_what_a_balance_may_be_follows_from_the_accuracy():
-    assert allowed(Options(None, 0.0, 1.0, accuracy=1e-4)) == pytest.approx(1e-3)
-    assert allowed(Options(None, 0.0, 1.0, accuracy=1e-4, accuracy_on=(("x", 1e-2),))) == pytest.approx(0.1)
-    assert allowed(Options(None, 0.0, 1.0, accuracy=None)) == 1e-12
-    assert allowed(Options(None, 0.0, 1.0, rtol=1e-6)) == pytest.approx(1e-2)
-    assert allowed(Options(None, 0.0, 1.0, rtol=1.0)) == 0.1
+    assert allowed_share(Options(None, 0.0, 1.0, accuracy=1e-4)) == pytest.approx(1e-3)
+    assert allowed_share(Options(None, 0.0, 1.0, accuracy=1e-4, accuracy_on=(("x", 1e-2),))) == pytest.approx(0.1)
+    assert allowed_share(Options(None, 0.0, 1.0, accuracy=None)) == 1e-12
+    assert allowed_share(Options(None, 0.0, 1.0, rtol=1e-6)) == pytest.approx(1e-2)
+    assert allowed_share(Options(None, 0.0, 1.0, rtol=1.0)) == 0.1
 
 
 def test_a_run_misses_a_balance_at_its_first_instant_beyond():
@@ -151,7 +151,7 @@ def test_implicit_euler_is_not_judged_and_what_should_stay_is_told():
     kept = balance(0.5, passed=0.0)
     found = judge(Options(None, 0.0, 1.0), "euler", [kept, balance(0.5)], True, [Estimate("x", 1.0, 1e-4, None)])
     assert (found.judged, found.not_met) == ((), ())
-    assert found.kept() == [{"what": "energy", "drift": 0.5, "of": 2.0, "unit": "J"}]
+    assert found.conserved_quantities() == [{"what": "energy", "drift": 0.5, "of": 2.0, "unit": "J"}]
 
 
 def test_a_quantity_that_misses_its_accuracy_is_named():
@@ -164,12 +164,14 @@ def test_a_quantity_that_misses_its_accuracy_is_named():
 
 def test_a_difference_of_large_terms_is_told_where_their_error_is_too_much_of_it():
     """Terms of 1000 known to 1e-6 are known to 1e-3, too little for 0.1 to 1e-4, enough for it to 2e-2."""
-    (found,) = cancelled({"d": 1000.0}, {"d": 0.1}, 1e-4, 1e-6, {})
+    (found,) = cancelling_quantities({"d": 1000.0}, {"d": 0.1}, 1e-4, 1e-6, {})
     assert (found.quantity, found.terms) == ("d", 1000.0)
     assert found.known == pytest.approx(1e-3)
-    assert not list(cancelled({"d": 1000.0}, {"d": 0.1}, 2e-2, 1e-6, {}))
-    assert not list(cancelled({"d": 1000.0}, {"d": 10.0}, 1e-9, 1e-6, {}))  # one hundredth has not cancelled
-    assert not list(cancelled({"d": 1000.0}, {"d": 1e-13}, 1e-4, 1e-6, {}))  # a zero by symmetry
+    assert not list(cancelling_quantities({"d": 1000.0}, {"d": 0.1}, 2e-2, 1e-6, {}))
+    assert not list(
+        cancelling_quantities({"d": 1000.0}, {"d": 10.0}, 1e-9, 1e-6, {})
+    )  # one hundredth has not cancelled
+    assert not list(cancelling_quantities({"d": 1000.0}, {"d": 1e-13}, 1e-4, 1e-6, {}))  # a zero by symmetry
 
 
 def test_what_an_event_is_late_by_counts_where_values_move():
@@ -179,10 +181,12 @@ def test_what_an_event_is_late_by_counts_where_values_move():
     moved = np.where(late > 0.0, late * np.array([[2.0, 0.0]]), np.inf)
     coarse = Sampled(1e-4, np.array([[0.0, 0.0], [1.0, 0.0], [3.0, 1.0]]), np.ones(2), 10)
     fine = Sampled(1e-6, np.array([[0.0, 0.0], [1.0009, 1.0], [3.0, 1.0]]), np.ones(2), 20, between=moved)
-    assert apart(coarse, fine)[1] == pytest.approx([9e-4, 0.0])
+    assert distance_of_runs(coarse, fine)[1] == pytest.approx([9e-4, 0.0])
     assert difference(coarse, fine, np.full(2, 1e-3)) == pytest.approx((9e-4, 0.9))
     turned = replace(fine, values=fine.values + np.array([[0.0], [0.05], [0.0]]), jump=np.array([0.0, 1.0]))
-    assert apart(coarse, turned)[1] == pytest.approx([0.0509, 0.05])  # of what does not jump all counts, else the rest
+    assert distance_of_runs(coarse, turned)[1] == pytest.approx(
+        [0.0509, 0.05]
+    )  # of what does not jump all counts, else the rest
 
 
 def test_a_front_within_one_step_of_the_coarser_run_is_seen():

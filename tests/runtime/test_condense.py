@@ -4,7 +4,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from sysdyn.runtime.condense.composition import composed
+from sysdyn.runtime.condense.composition import compose_definitions
 from sysdyn.runtime.condense.elimination import Elimination
 from sysdyn.runtime.condense.sums import Straights, Sums, numbers_of, sums
 
@@ -24,7 +24,7 @@ def test_sums_of_sums_are_the_inverse_of_their_matrix(seed):
     rows, sources, factor = np.array(rows), np.array(sources), np.array(factors)
     start = np.concatenate([[0], np.cumsum(np.bincount(rows, minlength=number))])
     own = np.where(sources < kept, sources, -1)
-    found = composed(start, own, np.where(sources >= kept, sources - kept, -1))
+    found = compose_definitions(start, own, np.where(sources >= kept, sources - kept, -1))
     direct, lower = np.zeros((number, kept)), np.zeros((number, number))
     np.add.at(direct, (rows[own >= 0], sources[own >= 0]), factor[own >= 0])
     np.add.at(lower, (rows[own < 0], sources[own < 0] - kept), factor[own < 0])
@@ -35,7 +35,7 @@ def test_sums_of_sums_are_the_inverse_of_their_matrix(seed):
 
 
 def test_no_sums_at_all():
-    found = composed(np.zeros(1, dtype=np.int64), np.zeros(0, dtype=np.int64), np.zeros(0, dtype=np.int64))
+    found = compose_definitions(np.zeros(1, dtype=np.int64), np.zeros(0, dtype=np.int64), np.zeros(0, dtype=np.int64))
     assert found.start.tolist() == [0]
     assert not found.values(np.zeros(0)).size
 
@@ -56,7 +56,7 @@ def numbers(factor):
 def test_numbers_of_sums_are_composed_of_what_is_kept():
     """e1 = 3 (1 + 2 z0) - z1: by z, 6 and -1."""
     of = numbers(3.0)
-    found = of.composed(4)
+    found = of.composition(4)
     full = np.zeros((2, 2))
     full[np.repeat([0, 1], np.diff(found.start)), found.source] = found.values(of.factor)
     assert full.tolist() == [[2.0, 0.0], [6.0, -1.0]]

@@ -8,7 +8,7 @@ from sysdyn.runtime.model import core_library as lib
 from sysdyn.runtime.model.balance import Balance
 from sysdyn.runtime.model.patterns import Pattern
 from sysdyn.runtime.numerics import ordering, rank
-from sysdyn.runtime.numerics.matching import matched
+from sysdyn.runtime.numerics.matching import match_rows
 
 
 def of_rank(random, m, n, k, spread):
@@ -210,7 +210,7 @@ def test_matchings_are_as_large_as_can_be():
         assert np.unique(found[there]).size == there.size == number
         assert (a.toarray()[found[there], there] != 0.0).all()
         given = np.where(random.random(n) < 0.5, found, -1)
-        other = matched(Pattern(m, n, column, row), given)
+        other = match_rows(Pattern(m, n, column, row), given)
         assert (other >= 0).sum() == number
         assert np.isin(found[given >= 0], other).all()  # a row that had a partner has one
 

@@ -6,11 +6,11 @@ import small_models as models
 from sysdyn.runtime.model.carrier import load
 from sysdyn.runtime.model.system import System
 from sysdyn.runtime.start.start import ConsistentState, consistent_start
-from sysdyn.runtime.structure.implicit import undetermined
+from sysdyn.runtime.structure.implicit import undetermined_implicits
 from sysdyn.runtime.structure.inertia import negative_inertia
-from sysdyn.runtime.structure.levels import undifferentiated
+from sysdyn.runtime.structure.levels import undifferentiated_families
 from sysdyn.runtime.structure.order import order_and_manifold
-from sysdyn.runtime.structure.rates import determined, unique
+from sysdyn.runtime.structure.rates import determined_rates, unique
 from sysdyn.runtime.structure.structure import structure
 
 
@@ -61,7 +61,7 @@ def test_an_effort_that_its_law_leaves_open_at_rest():
     def asleep(law, **values):
         system = system_of(models.small("x", "f_x**2/2", work={"x": "-e_1"}, implicit=("1",), gamma={"law": law}))
         state = at(system, **values)
-        return undetermined(system, state, structure(system, state))
+        return undetermined_implicits(system, state, structure(system, state))
 
     assert asleep("e_1**3 - t") == ("e_1",)
     assert asleep("e_1**2 - f_x") == ()  # its balance determines it
@@ -116,7 +116,7 @@ def test_rates_that_only_a_difference_has():
     known = unique(system, system.jacobian(0.0, state.y, state.yd)[1])
     names = [system.name(k) for k in range(system.unknowns)]
     assert {name for name, ok in zip(names, known, strict=True) if not ok} == {"f_a", "f_b"}
-    assert determined(system, state).tolist() == [False, False, True, True]
+    assert determined_rates(system, state).tolist() == [False, False, True, True]
 
 
 def test_constraints_that_are_not_differentiated():
@@ -126,8 +126,8 @@ def test_constraints_that_are_not_differentiated():
     law = {"node": "f_a + f_b - f_c"}
     without = models.small("a b c", "f_c**2/2", "q_a**2/2", "f_b**2/2", psi=law)
     heavy = models.small("a b c", "f_a**2/2 + f_b**2/2 + f_c**2/2", "q_a**2/2", psi=law)
-    assert len(undifferentiated(system_of(without))) == 1
-    assert undifferentiated(system_of(heavy)) == ()
+    assert len(undifferentiated_families(system_of(without))) == 1
+    assert undifferentiated_families(system_of(heavy)) == ()
 
 
 def test_balances_that_would_be_differentiated():
@@ -135,4 +135,4 @@ def test_balances_that_would_be_differentiated():
     equation.
     """
     tied = models.small("a b", 0, "q_a**2/2 + q_b**2/2", phi={"tie": "q_a - q_b - 1"})
-    assert undifferentiated(system_of(tied)) is None
+    assert undifferentiated_families(system_of(tied)) is None

@@ -42,7 +42,7 @@ def system_of(matrix, formulation, *guesses):
         model = compile_network(network, formulation, "numpy")
         binding = model.bind()
         description = describe(model.manifest(binding), Prepared.arrays_of(binding))
-        return System.of(description, load(module_of(model.text)), "3")
+        return System.from_description(description, load(module_of(model.text)), "3")
 
 
 FORMULATIONS = ["lagrangian", "hamiltonian"]

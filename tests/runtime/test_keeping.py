@@ -35,7 +35,7 @@ def written(kept, *chunks, first=True):
 @pytest.mark.parametrize("path", [None, "trace.h5"])
 def test_a_run_is_what_was_written_in_memory_as_in_a_file(path, tmp_path):
     kept = keeping(None if path is None else tmp_path / path)
-    with kept.claimed():
+    with kept.claim():
         writer = written(kept, [0.0, 1.0], [], [3.0])
         writer.finish({"x": 9.0}, {"met": 1}, True)
     found = Trace.open(tmp_path / path) if path else writer.trace
@@ -66,7 +66,7 @@ def test_a_run_in_memory_is_let_go():
 
 def test_a_finer_run_takes_the_place_of_the_one_before_it(tmp_path):
     kept = Files(tmp_path / "trace.h5")
-    with kept.claimed():
+    with kept.claim():
         draft = written(kept, [0.0, 1.0])
         finer = written(kept, [0.0, 0.5, 1.0], first=False)
         assert Trace.open(kept.path).time.size == 2
@@ -78,7 +78,7 @@ def test_a_finer_run_takes_the_place_of_the_one_before_it(tmp_path):
 
 def test_a_run_that_failed_beside_a_finished_one_leaves_nothing(tmp_path):
     kept = Files(tmp_path / "trace.h5")
-    with kept.claimed():
+    with kept.claim():
         draft = written(kept, [0.0, 1.0])
         finer = written(kept, [0.0], first=False)
         kept.drop(finer)
@@ -112,7 +112,7 @@ def test_the_head_of_a_row_is_as_long_in_the_core_as_in_what_reads_it():
 def test_parameters_of_one_unit_and_of_several_come_back(tmp_path):
     given = (TraceParameter("m", 2.0, "kg"), TraceParameter("a/b", 3.0, "kg"), TraceParameter("k", 4.0, "N/m"))
     kept = Files(tmp_path / "trace.h5")
-    with kept.claimed():
+    with kept.claim():
         writer = kept.writer(Layout(LAYOUT.columns, 2, {}, given), True)
         writer.append(rows([0.0]))
         writer.finish({}, {}, True)
@@ -124,7 +124,7 @@ def test_each_of_many_parameters_keeps_its_own_number_and_unit(tmp_path):
     units = ("F", "ohm", "kg*m^2/s^2")
     given = tuple(TraceParameter(f"C{k}.C", (-1.0) ** k * np.exp(0.37 * k), units[k % 3]) for k in range(300))
     kept = Files(tmp_path / "trace.h5")
-    with kept.claimed():
+    with kept.claim():
         writer = kept.writer(Layout(LAYOUT.columns, 2, {}, given), True)
         writer.append(rows([0.0]))
         writer.finish({}, {}, True)

@@ -11,7 +11,14 @@ from sysdyn.runtime.integrate.weights.told import UNPULLED, Told
 from sysdyn.runtime.integrate.weights.unknown_roles import roles
 from sysdyn.runtime.model import core_library as lib
 from sysdyn.runtime.model.carrier import load
-from sysdyn.runtime.model.scales import ROUND_OFF, confirmed, group_maximum, largest_of_group, noise, unresolved
+from sysdyn.runtime.model.scales import (
+    ROUND_OFF,
+    confirm_magnitudes,
+    group_maximum,
+    largest_of_group,
+    noise,
+    unresolved_sizes,
+)
 from sysdyn.runtime.model.system import System
 from sysdyn.runtime.start.start import consistent_start
 
@@ -73,13 +80,15 @@ def rod(**more):
 def test_round_off_of_a_constraint_is_that_of_its_largest_term():
     """Slopes are 6 and -8, the terms 18 and 32: of x nothing is known below 32 eps/6, of y below 32 eps/8."""
     system, y, jy = rod()
-    assert unresolved(system, y, jy) == pytest.approx(values(system, q_x=32 / 6 * EPS, q_y=4 * EPS), rel=1e-14, abs=0.0)
+    assert unresolved_sizes(system, y, jy) == pytest.approx(
+        values(system, q_x=32 / 6 * EPS, q_y=4 * EPS), rel=1e-14, abs=0.0
+    )
 
 
 def test_what_stands_in_no_constraint_is_known():
     system = system_of(models.mass_spring())
     y = values(system, q_x=0.5, f_x=1.0)
-    assert (unresolved(system, y, system.jacobian(0.0, y, y)[0]) == 0.0).all()
+    assert (unresolved_sizes(system, y, system.jacobian(0.0, y, y)[0]) == 0.0).all()
 
 
 @pytest.mark.long
@@ -103,7 +112,7 @@ def after(met, magnitude, *, nominal=None, span=10.0):
     for family in made[0]["structure"]["families"]:
         family["nominal"] = (nominal or {}).get(family["name"])
     system = system_of(made)
-    found = confirmed(system, span, values(system, **met), values(system, **magnitude))
+    found = confirm_magnitudes(system, span, values(system, **met), values(system, **magnitude))
     return dict(zip(system.unknown_names, found, strict=True))
 
 
@@ -151,7 +160,7 @@ class Given:
 def told(request, kept=None, index=2):
     system, y, _ = rod()
     found = roles(system, 0.0, system.jacobian(0.0, y, np.zeros_like(y))[1], index)
-    found = found if kept is None else found.kept(kept)
+    found = found if kept is None else found.select(kept)
     return system, found, Told(system, request, Given(np.array([5.0, 5.0, 1.0, 1.0, 1e6])), found, kept)
 
 

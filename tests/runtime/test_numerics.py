@@ -2,18 +2,18 @@
 
 import numpy as np
 import pytest
-from sysdyn.runtime.numerics.equilibrate import equilibrated, factors, sparse_factors
+from sysdyn.runtime.numerics.equilibrate import equilibrate, factors, sparse_factors
 from sysdyn.runtime.numerics.points import distinct, normal, uniform
-from sysdyn.runtime.numerics.products import PIECE, add_product, linked
+from sysdyn.runtime.numerics.products import PIECE, add_product, linked_places
 from sysdyn.runtime.numerics.rank import (
     TOLERANCE,
     NotFiniteError,
     count,
-    decomposed,
     least_squares,
     left_null_vectors,
     null_space,
     rank,
+    singular_decomposition,
 )
 
 
@@ -29,7 +29,7 @@ def test_the_rank_of_a_product_is_that_of_its_factors_in_any_units(seed):
     r = int(random.integers(1, min(m, n) + 1))
     matrix = random.standard_normal((m, r)) @ random.standard_normal((r, n))
     rows, columns = 10.0 ** random.uniform(-9, 9, m), 10.0 ** random.uniform(-9, 9, n)
-    (scaled,) = equilibrated(rows[:, None] * matrix * columns)
+    (scaled,) = equilibrate(rows[:, None] * matrix * columns)
     assert rank(scaled) == r
     null = null_space(scaled)
     assert null.shape == (n, n - r)
@@ -64,9 +64,9 @@ def test_factors_do_not_see_the_units():
     random = np.random.default_rng(2)
     matrix = random.standard_normal((7, 5)) * (random.random((7, 5)) < 0.6)
     matrix[3] = 0.0
-    (plain,) = equilibrated(matrix)
+    (plain,) = equilibrate(matrix)
     other = 10.0 ** random.uniform(-30, 30, 7)[:, None] * matrix * 10.0 ** random.uniform(-30, 30, 5)
-    (scaled,) = equilibrated(other)
+    (scaled,) = equilibrate(other)
     for found in (plain, scaled):
         assert np.abs(np.log10(np.abs(found).max(axis=1)[[0, 1, 2, 4, 5, 6]])).max() < 0.3
         assert np.abs(np.log10(np.abs(found).max(axis=0))).max() < 0.3
@@ -76,7 +76,7 @@ def test_factors_do_not_see_the_units():
 def test_a_pair_keeps_its_pencil():
     """Both matrices of a pencil take the same factors: their generalised eigenvalues stay."""
     a, b = np.diag([1e6, 2e-6]), np.diag([2e6, 1e-6])
-    one, two = equilibrated(a, b)
+    one, two = equilibrate(a, b)
     assert np.sort(np.diag(one) / np.diag(two)) == pytest.approx([0.5, 2.0], rel=1e-14)
     row, column = factors(a, b)
     assert np.abs(row[:, None] * a * column - one).max() < 1e-15
@@ -107,7 +107,11 @@ def test_least_squares_is_the_pseudo_inverse():
 def test_what_is_no_number_has_no_rank(bad, capfd):
     matrix = np.eye(3)
     matrix[1, 2] = bad
-    for ask in (lambda: rank(matrix), lambda: decomposed(matrix), lambda: least_squares(matrix, np.ones(3))):
+    for ask in (
+        lambda: rank(matrix),
+        lambda: singular_decomposition(matrix),
+        lambda: least_squares(matrix, np.ones(3)),
+    ):
         with pytest.raises(NotFiniteError):
             ask()
     with pytest.raises(NotFiniteError):
@@ -179,4 +183,4 @@ def test_rows_with_entries_in_chosen_columns_are_those_of_the_products_with_them
     rows, columns = (random.integers(0, n, entries, dtype=np.int32) for n in (50_000, 4_000))
     chosen = random.random(4_000) < 0.1
     product = np.bincount(rows, chosen[columns].astype(float), 50_000)
-    assert (linked(chosen, columns, rows, 50_000) == (product > 0.0)).all()
+    assert (linked_places(chosen, columns, rows, 50_000) == (product > 0.0)).all()

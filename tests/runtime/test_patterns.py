@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 from sysdyn.runtime.model.description import _kernel
 from sysdyn.runtime.model.failures import ContractError
-from sysdyn.runtime.model.patterns import numbered, places, spared
+from sysdyn.runtime.model.patterns import number_pairs, places, spared_loops
 
 # x[i] in rows i, columns j; loops i = 1..n, j = 1..i (ix = 1, n)
 LOOPS = [[0, 1], [0, [0, -1, 0]]]
@@ -37,7 +37,7 @@ def test_a_loop_is_spared_where_nobody_reads_a_row_of_it():
     kernels = [kernel([[0, 1]], inner=0), kernel([[1, 2]], inner=0), _kernel({"rows": [[0, [[-1, 0, 0]]]]})]
     for read, expected in (([0], [0, 1, 0]), ([2], [0, 0, 0]), ([4], [1, 0, 0]), ([], [1, 1, 0])):
         rows = np.isin(np.arange(5), read)
-        assert spared(kernels, rows, ix, shapes, to).tolist() == expected
+        assert spared_loops(kernels, rows, ix, shapes, to).tolist() == expected
 
 
 def test_a_bound_follows_outer_loops_only():
@@ -50,7 +50,7 @@ def test_pairs_are_numbered_in_their_order(size, firsts, seconds):
     random = np.random.default_rng(size)
     first, second = random.integers(0, firsts, size), random.integers(0, seconds, size)
     keys, wanted = np.unique(first * seconds + second, return_inverse=True)
-    found, begin, each = numbered(first, second, firsts, seconds)
+    found, begin, each = number_pairs(first, second, firsts, seconds)
     assert np.array_equal(found, wanted.ravel())
     assert np.array_equal(each, keys % seconds)
     assert np.array_equal(np.repeat(np.arange(firsts), np.diff(begin)), keys // seconds)

@@ -9,7 +9,7 @@ from sysdyn import api
 from sysdyn.runtime.integrate import integrate
 from sysdyn.runtime.model import core_library as lib
 from sysdyn.runtime.model.carrier import load
-from sysdyn.runtime.model.redirected import redirected
+from sysdyn.runtime.model.redirected import redirect_entries
 from sysdyn.runtime.model.system import System
 
 
@@ -22,7 +22,7 @@ def test_each_entry_stands_where_it_was_sent(index):
     of, random = System(made[0], made[1], load(made[2]), index), np.random.default_rng(5)
     entries, (y, yd) = of.pattern.entries, random.uniform(0.5, 1.5, (2, of.unknowns))
     places = np.stack([random.permutation(3 * entries)[:entries] for _ in range(2)]).astype(np.int32)
-    elsewhere = redirected(of, *places, 3 * entries)
+    elsewhere = redirect_entries(of, *places, 3 * entries)
     elsewhere.core.kinematics = 0  # rows q' - f are none of a block's
     found = np.full((2, 3 * entries + 1), 7.0)
     held = np.zeros((2, of.form.extended))

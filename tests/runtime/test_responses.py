@@ -4,7 +4,7 @@ import mpmath
 import numpy as np
 import pytest
 from sysdyn.runtime.linear import precise, responses, witness
-from sysdyn.runtime.linear.modes import Transfer, modes, stored, transfer, wide_transfer
+from sysdyn.runtime.linear.modes import Transfer, modes, store_shares, transfer, wide_transfer
 from sysdyn.runtime.linear.tangent import Reduced
 
 NONE = np.zeros(0, complex)
@@ -30,7 +30,7 @@ def test_a_lag_falls_by_three_decibels_at_its_corner():
 
 def test_an_improper_part_grows_with_the_frequency():
     one = Transfer(0, 0, NONE, NONE, 3.0, 3.0, (0.5, 0.25))
-    assert responses.at(one, np.array([2j])) == pytest.approx([3.0 + 1j - 1.0])
+    assert responses.at_frequencies(one, np.array([2j])) == pytest.approx([3.0 + 1j - 1.0])
 
 
 def test_a_response_spans_a_decade_around_its_corners():
@@ -100,7 +100,7 @@ def test_energy_of_an_oscillation_is_half_in_each_store():
     found = modes(np.array([[0.0, 1.0], [-25.0, 0.0]]))
     # q, e = 25 q of the spring; p, f of the unit mass
     content, conjugate = np.array([[1.0, 0.0], [0.0, 1.0]]), np.array([[25.0, 0.0], [0.0, 1.0]])
-    assert stored(found, content, conjugate) == pytest.approx(np.full((2, 2), 0.5))
+    assert store_shares(found, content, conjugate) == pytest.approx(np.full((2, 2), 0.5))
 
 
 def test_a_transfer_function_has_the_zeros_and_the_gain_of_its_quotient():
@@ -144,8 +144,8 @@ def test_wide_elimination_solves_what_doubles_lose():
     with precise.digits():
         hilbert = np.array([[mpmath.mpf(1) / (i + j + 1) for j in range(n)] for i in range(n)], dtype=object)
         aim = hilbert @ precise.wide(np.ones((n, 1)))
-        assert precise.narrow(precise.solved(hilbert, aim)) == pytest.approx(np.ones((n, 1)), rel=1e-15)
-        assert precise.solved(precise.wide(np.ones((2, 2))), precise.wide(np.ones((2, 1)))) is None
+        assert precise.narrow(precise.solve(hilbert, aim)) == pytest.approx(np.ones((n, 1)), rel=1e-15)
+        assert precise.solve(precise.wide(np.ones((2, 2))), precise.wide(np.ones((2, 1)))) is None
 
 
 def test_wide_eigenvalues_keep_a_slow_one_beside_a_fast_one():
@@ -165,17 +165,21 @@ def test_a_quotient_loses_what_cancels():
 
 def test_partners_of_eigenvalues_are_the_nearest():
     one, other = np.array([1.0, -10.0], complex), np.array([-10.1, 1.0], complex)
-    assert precise.apart(one, other) == pytest.approx([0.0, 0.1 / 10.1])
+    assert precise.relative_distances(one, other) == pytest.approx([0.0, 0.1 / 10.1])
     assert not precise.steady(one, other)
     assert precise.steady(one, one[::-1])
 
 
 def test_a_threefold_zero_that_round_off_moved_is_at_zero():
     values = np.array([1e-5, -1e-5j, 1e-5j, -1.0], complex)
-    found = precise.settled(precise.Decomposed(values, np.eye(4), np.eye(4)), values * [2.0, 2.0, 2.0, 1.0], ValueError)
+    found = precise.settle_modes(
+        precise.Decomposed(values, np.eye(4), np.eye(4)), values * [2.0, 2.0, 2.0, 1.0], ValueError
+    )
     assert found.values.tolist() == [0.0, 0.0, 0.0, -1.0]
     with pytest.raises(ValueError):
-        precise.settled(precise.Decomposed(values, np.eye(4), np.eye(4)), values * [1.0, 1.0, 1.0, 2.0], ValueError)
+        precise.settle_modes(
+            precise.Decomposed(values, np.eye(4), np.eye(4)), values * [1.0, 1.0, 1.0, 2.0], ValueError
+        )
 
 
 def test_independent_rows_are_those_of_the_first_group():

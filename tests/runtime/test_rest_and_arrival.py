@@ -78,10 +78,10 @@ def test_an_origin_has_rates_of_what_is_differentiated_and_magnitudes():
     y, yd, rate = found.point(own=False)
     assert y is not found.y
     assert by_name(of, yd)["f_x"] == by_name(of, rate)["f_x"] == pytest.approx(-9.0)
-    magnitude, tau = found.sized(10.0)
+    magnitude, tau = found.initial_sizes(10.0)
     assert by_name(of, magnitude)["q_x"] == pytest.approx(1.0)
     assert 0.0 < tau < 10.0
-    assert found.sized(10.0)[0] is magnitude  # once a span
+    assert found.initial_sizes(10.0)[0] is magnitude  # once a span
     before = found.jy
     found.let_go()
     assert found.jy is not before

@@ -72,10 +72,10 @@ def test_no_guess_is_larger_than_what_the_run_before_met():
 def test_what_a_method_of_fewer_unknowns_meets_is_shared():
     """Unknowns 0 and 2 are stepped and meet 7 and 9; 1 and 3 follow, and are known where they stand."""
     of = sizes([1.0, 2.0, 3.0, 4.0], [0.0] * 4)
-    magnitude, met = of.stepped(np.array([0, 2]))
+    magnitude, met = of.sizes_of_method(np.array([0, 2]))
     assert magnitude.tolist() == [1.0, 3.0]
     met[:], magnitude[:] = (7.0, 9.0), (7.0, 9.0)
-    largest, known = of.at(np.array([0.0, -5.0, 0.0, 1.0]))
+    largest, known = of.sizes_at(np.array([0.0, -5.0, 0.0, 1.0]))
     assert largest.tolist() == [7.0, 5.0, 9.0, 1.0]
     assert known.tolist() == [7.0, 5.0, 9.0, 4.0]
     assert of.met.tolist() == [0.0] * 4  # nothing is shared before it is asked to be

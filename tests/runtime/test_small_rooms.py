@@ -5,7 +5,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 from sysdyn.runtime.events import observer
-from sysdyn.runtime.events.bounces import SEEN, flights, thrown
+from sysdyn.runtime.events.bounces import SEEN, flights, is_thrown
 from sysdyn.runtime.events.watching import FALLEN, Watching
 from sysdyn.runtime.integrate.jumps.first_step import PARTS, WIDER, FirstStep
 from sysdyn.runtime.integrate.jumps.modes import EARLY
@@ -73,7 +73,7 @@ def test_samples_are_due_once_each_whatever_their_instants_are_rounded_to():
 def test_behind_an_impact_a_gap_closes_below_a_part_of_what_it_rises_to(speed):
     watch, gap = Watch(), SimpleNamespace(row=np.array([3]), side=np.array([1]), rate=np.array([4]))
     assert (watch._edges(gap).small, watch._edges(gap).level) == (1e-6, 0.0)
-    watch.bounces = {3: thrown(0.7, -1e-9, speed, G)}
+    watch.bounces = {3: is_thrown(0.7, -1e-9, speed, G)}
     rises = 0.5 * speed**2 / G
     assert watch._edges(gap).small == pytest.approx(FALLEN * min(1e-6, rises), rel=1e-12)
     assert watch._edges(gap).level == -1e-9

@@ -4,7 +4,7 @@ import small_models as models
 from sysdyn.runtime.model.carrier import load
 from sysdyn.runtime.model.patterns import Pattern
 from sysdyn.runtime.model.system import System
-from sysdyn.runtime.numerics.matching import matched
+from sysdyn.runtime.numerics.matching import match_rows
 from sysdyn.runtime.start.start import consistent_start
 from sysdyn.runtime.structure.structure import _growth_index, null_vectors, pencil_index, structure
 
@@ -107,6 +107,6 @@ def test_a_singular_pencil_is_told_from_one_whose_entries_lie_far_apart(spread, 
 def test_a_matching_is_as_large_as_it_can_be_and_leaves_what_has_none():
     """Three columns that two rows are left for, and one with a row of its own."""
     column, row = np.array([0, 2, 4, 6, 7], dtype=np.int32), np.array([0, 1, 0, 1, 0, 1, 2], dtype=np.int32)
-    found = matched(Pattern(3, 4, column, row))
+    found = match_rows(Pattern(3, 4, column, row))
     assert sorted(found) == [-1, 0, 1, 2]
     assert found[3] == 2

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from sysdyn.runtime.numerics.rank import (
     CERTAIN,
-    decomposed,
+    singular_decomposition,
     singular_values,
     sure_complement,
     sure_solver,
@@ -43,16 +43,16 @@ def test_a_matrix_that_is_regular_beyond_doubt_solves():
     square, _ = with_singular_values(rng, 50, 50, np.geomspace(1.0, 1e-5, 50))
     wanted = rng.normal(size=(50, 4))
     assert np.abs(sure_solver(square, CERTAIN)(square @ wanted) - wanted).max() < 1e-9
-    assert np.abs(singular_values(square) - decomposed(square)[1]).max() < 1e-14
+    assert np.abs(singular_values(square) - singular_decomposition(square)[1]).max() < 1e-14
 
 
 def test_a_small_matrix_is_decomposed_once():
     """Whoever asks for it again has the same arrays, which nobody may write."""
     matrix = np.array([[3.0, 0.0], [0.0, 2.0], [0.0, 0.0]])
-    u, sigma, vt = decomposed(matrix)
+    u, sigma, vt = singular_decomposition(matrix)
     assert sigma.tolist() == [3.0, 2.0]
     assert (u[:, :2] * sigma @ vt == matrix).all()
-    assert decomposed(matrix.copy())[0] is u
-    assert decomposed(2.0 * matrix)[1].tolist() == [6.0, 4.0]
+    assert singular_decomposition(matrix.copy())[0] is u
+    assert singular_decomposition(2.0 * matrix)[1].tolist() == [6.0, 4.0]
     with pytest.raises(ValueError, match="read-only"):
         sigma[0] = 1.0

@@ -6,7 +6,7 @@ from sysdyn.runtime.model.patterns import Places, compress
 from sysdyn.runtime.numerics import least_change, tall
 from sysdyn.runtime.numerics.least_change import least_norm
 from sysdyn.runtime.numerics.ordering import neighbours, paired_order, symmetric_order, tall_order
-from sysdyn.runtime.numerics.tall import determined, free_unknowns, left_open
+from sysdyn.runtime.numerics.tall import determine, free_unknowns, left_open
 
 N = 400
 
@@ -34,7 +34,7 @@ def test_rows_in_excess_change_nothing():
     k = np.arange(1, N + 1)
     exact = 0.5 * k * (N + 1 - k)
     assert _times(shape, entries, exact) == pytest.approx(np.ones(shape[0]), abs=1e-9)
-    found = determined(shape, entries, np.ones(shape[0]))
+    found = determine(shape, entries, np.ones(shape[0]))
     assert found == pytest.approx(exact, rel=1e-11)
 
 
@@ -42,16 +42,16 @@ def test_what_is_open_is_not_determined():
     """A column without a row of its own; columns that stand in rows together alone; more columns than rows."""
     shape, (i, j, v) = _chain()
     aim = np.ones(shape[0])
-    assert determined((shape[0], N + 1), (i, j, v), aim)[N] == 0.0  # stands in no row: the least is zero
+    assert determine((shape[0], N + 1), (i, j, v), aim)[N] == 0.0  # stands in no row: the least is zero
     pair = np.append(i, [0, 1]), np.append(j, [N, N]), np.append(v, [0.0, 0.0])
-    assert determined((shape[0], N + 1), pair, aim)[N] == 0.0
+    assert determine((shape[0], N + 1), pair, aim)[N] == 0.0
     square = i < N  # no more rows than unknowns, and a column of zeros beside them
     zeros = np.append(i[square], 0), np.append(j[square], N), np.append(v[square], 0.0)
-    assert determined((N, N + 1), zeros, np.ones(N))[N] == 0.0
+    assert determine((N, N + 1), zeros, np.ones(N))[N] == 0.0
     twice = np.concatenate([i, i]), np.concatenate([j, j + N]), np.concatenate([v, v])
-    assert determined((shape[0], 2 * N), twice, aim) is None
+    assert determine((shape[0], 2 * N), twice, aim) is None
     both = np.concatenate([i, i + shape[0], i]), np.concatenate([j, j, j + N]), np.concatenate([v, v, v])
-    assert determined((2 * shape[0], 2 * N), both, np.concatenate([aim, aim])) is not None
+    assert determine((2 * shape[0], 2 * N), both, np.concatenate([aim, aim])) is not None
 
 
 def test_rows_that_determine_everything_leave_nothing_open():
@@ -83,7 +83,7 @@ def test_a_difference_alone_leaves_the_mean_open():
     k = np.arange(n)
     entries = np.concatenate([k, k]), np.concatenate([k, (k + 1) % n]), np.concatenate([np.ones(n), -np.ones(n)])
     aim = np.cos(2.0 * np.pi * k / n)
-    assert determined((n, n), entries, aim) is None
+    assert determine((n, n), entries, aim) is None
     found = least_norm((n, n), entries, aim)
     assert found.sum() == pytest.approx(0.0, abs=1e-6 * np.abs(found).max())
     assert _times((n, n), entries, found) == pytest.approx(aim, abs=1e-9)
@@ -170,13 +170,13 @@ def test_what_follows_row_by_row_needs_no_factors(monkeypatch):
     shape, entries = _sums()
     exact = np.cos(np.arange(N))
     aim = _times(shape, entries, exact)
-    monkeypatch.setattr(tall, "_factored", lambda *_: pytest.fail("rows follow one after the other"))
-    assert tall.determined(shape, entries, aim) == pytest.approx(exact, rel=1e-12, abs=1e-13)
+    monkeypatch.setattr(tall, "_factor", lambda *_: pytest.fail("rows follow one after the other"))
+    assert tall.determine(shape, entries, aim) == pytest.approx(exact, rel=1e-12, abs=1e-13)
     i, j, v = entries
     by_columns = np.lexsort((i, j))  # as a pattern has them: taken as they stand
     in_order = i[by_columns], j[by_columns], v[by_columns]
     assert tall.by_columns(shape, in_order, fewer=False).values is in_order[2]
-    assert (tall.determined(shape, in_order, aim) == tall.determined(shape, entries, aim)).all()
+    assert (tall.determine(shape, in_order, aim) == tall.determine(shape, entries, aim)).all()
 
 
 def test_a_matrix_by_its_columns_is_that_by_its_entries():
@@ -188,7 +188,7 @@ def test_a_matrix_by_its_columns_is_that_by_its_entries():
         np.add.at(matrix, (rows, columns), values)
     assert (full == again).all()
     x, aim = np.cos(np.arange(N + 1.0)), np.sin(np.arange(float(shape[0])))
-    np.testing.assert_allclose(of.missed(x, aim), aim - full @ x, rtol=0.0, atol=1e-12)
+    np.testing.assert_allclose(of.residual(x, aim), aim - full @ x, rtol=0.0, atol=1e-12)
 
 
 def test_rows_in_excess_that_substitution_misses_are_left_to_factors():
@@ -200,7 +200,7 @@ def test_rows_in_excess_that_substitution_misses_are_left_to_factors():
     v = np.concatenate([[1.0, 1.0], np.full(k.size, -1.0), np.full(k.size, 4.0), np.full(k.size, -1.0), [1.0]])
     exact = (2.0 - np.sqrt(3.0)) ** np.arange(n)
     aim = _times((n + 1, n), (i, j, v), exact)
-    alone = tall.determined((n + 1, n), (i, j, v), aim)
+    alone = tall.determine((n + 1, n), (i, j, v), aim)
     assert np.abs(alone - exact).max() > 1e3  # as long as nobody looks at the last row
     found = least_norm((n + 1, n), (i, j, v), aim)
     assert _times((n + 1, n), (i, j, v), found) == pytest.approx(aim, abs=1e-9)
@@ -211,7 +211,7 @@ def test_an_unknown_does_not_follow_by_an_entry_that_is_next_to_none():
     shape, (i, j, v) = _sums()
     faint = np.where((j == 9) & (np.isin(i, i[(j == 9) & (v > 0.5)])), 1e-12, v)
     columns = tall.by_columns(shape, (i, j, faint), fewer=False)
-    assert tall._substituted(columns, np.ones(shape[0]), np.zeros(N)) == 1
+    assert tall._substitute(columns, np.ones(shape[0]), np.zeros(N)) == 1
 
 
 @pytest.mark.parametrize("n", [150, 500])
@@ -247,8 +247,8 @@ def test_what_may_stay_open_is_left_where_others_are_determined():
     """Of pairs the difference alone is told: it holds, and all else is what it is without them."""
     n = 60
     shape, entries, aim, idle = _pairs(n)
-    assert determined(shape, entries, aim) is None
-    found = determined(shape, entries, aim, idle=idle)
+    assert determine(shape, entries, aim) is None
+    found = determine(shape, entries, aim, idle=idle)
     k = np.arange(1, N + 1)
     assert found[:N] == pytest.approx(0.5 * k * (N + 1 - k), rel=1e-11)
     assert found[N : N + n] == pytest.approx(found[:n], rel=1e-13)
@@ -262,7 +262,7 @@ def test_what_others_open_ones_move_is_not_determined():
     """The pairs' first ones may stay open, their second ones, which move with them, may not."""
     shape, entries, aim, idle = _pairs()
     idle[-60:] = False
-    assert determined(shape, entries, aim, idle=idle) is None
+    assert determine(shape, entries, aim, idle=idle) is None
 
 
 def test_rows_may_be_fewer_by_what_may_stay_open():
@@ -272,7 +272,7 @@ def test_rows_may_be_fewer_by_what_may_stay_open():
     rows, columns = np.concatenate([k, n + k, n + k]), np.concatenate([k, n + k, 2 * n + k])
     entries = rows, columns, np.concatenate([2.0 * np.ones(n), np.ones(n), -np.ones(n)])
     idle = np.arange(3 * n) >= n
-    found = determined((2 * n, 3 * n), entries, np.cos(np.arange(2.0 * n)), idle=idle)
+    found = determine((2 * n, 3 * n), entries, np.cos(np.arange(2.0 * n)), idle=idle)
     assert found[:n] == pytest.approx(0.5 * np.cos(k), rel=1e-14)
     assert found[n : 2 * n] - found[2 * n :] == pytest.approx(np.cos(n + k), rel=1e-13)
 
@@ -289,4 +289,4 @@ def test_rows_in_excess_of_open_ones_are_met_or_refused():
     shape, entries, aim, idle = _pairs()
     aim[-1] += 1.0
     missed = lambda found: np.abs(_times(shape, entries, found) - aim).max() < 1e-6  # noqa: E731
-    assert determined(shape, entries, aim, missed, idle) is None
+    assert determine(shape, entries, aim, missed, idle) is None

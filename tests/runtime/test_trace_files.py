@@ -6,27 +6,27 @@ import h5py
 import numpy as np
 import pytest
 from sysdyn.runtime.model.failures import TraceError
-from sysdyn.runtime.trace.claim import claimed
-from sysdyn.runtime.trace.opening import opened, regular, replaceable
+from sysdyn.runtime.trace.claim import claim_trace
+from sysdyn.runtime.trace.opening import open_regular, regular, replaceable
 
 
 def test_one_run_at_a_time_writes_a_trace(tmp_path):
     path = tmp_path / "run.h5"
-    with claimed(path):
+    with claim_trace(path):
         assert (tmp_path / ".run.h5.lock").exists()
-        with pytest.raises(TraceError, match="another run is writing this trace"), claimed(path):
+        with pytest.raises(TraceError, match="another run is writing this trace"), claim_trace(path):
             pass
-        with claimed(tmp_path / "other.h5"):  # another trace of the folder is nobody's
+        with claim_trace(tmp_path / "other.h5"):  # another trace of the folder is nobody's
             pass
     assert list(tmp_path.iterdir()) == []
-    with claimed(path):
+    with claim_trace(path):
         pass
 
 
 def test_a_lock_that_somebody_left_is_taken(tmp_path):
     """A lock dies with its process: its file says nothing."""
     (tmp_path / ".run.h5.lock").write_text("")
-    with claimed(tmp_path / "run.h5"):
+    with claim_trace(tmp_path / "run.h5"):
         pass
     assert list(tmp_path.iterdir()) == []
 
@@ -36,7 +36,7 @@ def test_a_lock_follows_no_link(tmp_path):
     mine = tmp_path / "mine.txt"
     mine.write_text("kept")
     (tmp_path / ".run.h5.lock").symlink_to(mine)
-    with pytest.raises(TraceError, match=r"run\.h5"), claimed(tmp_path / "run.h5"):
+    with pytest.raises(TraceError, match=r"run\.h5"), claim_trace(tmp_path / "run.h5"):
         pass
     assert mine.read_text() == "kept"
 
@@ -46,9 +46,9 @@ def test_only_regular_files_are_opened(tmp_path):
     with pytest.raises(OSError, match="no regular file"):
         regular(tmp_path / "pipe")
     with pytest.raises(IsADirectoryError):
-        opened(tmp_path)
+        open_regular(tmp_path)
     with pytest.raises(FileNotFoundError):
-        opened(tmp_path / "none.h5")
+        open_regular(tmp_path / "none.h5")
 
 
 @pytest.fixture
@@ -81,7 +81,7 @@ def test_no_file_leads_to_another(tmp_path, secret, way):
         file.attrs["source"] = np.bytes_("sysdyn")
         way(file, secret)
     with pytest.raises(OSError, match="it' leads to another file: not followed"):
-        opened(path)
+        open_regular(path)
     assert not replaceable(path)
 
 
@@ -90,7 +90,7 @@ def test_links_within_a_file_are_its_own(tmp_path):
     with h5py.File(path, "w") as file:
         file["time"] = [0.0, 1.0]
         file["same"] = h5py.SoftLink("/time")
-    with opened(path) as file:
+    with open_regular(path) as file:
         assert file["same"][()].tolist() == [0.0, 1.0]
 
 

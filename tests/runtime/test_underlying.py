@@ -22,7 +22,7 @@ from sysdyn.dsl.model import expression as x
 from sysdyn.dsl.text.diagnostics import Report
 from sysdyn.runtime.integrate.integrate import Integration
 from sysdyn.runtime.integrate.request import Request
-from sysdyn.runtime.integrate.underlying import Underlying, _unmatched
+from sysdyn.runtime.integrate.underlying import Underlying, _unmatched_unknowns
 from sysdyn.runtime.model import carrier
 from sysdyn.runtime.model.description import describe
 from sysdyn.runtime.model.patterns import Pattern
@@ -52,7 +52,7 @@ def made(key, k):
         compiled = compile_network(network(CATALOGUE[key], model), model["form"], "numpy", integrating=False)
         binding = compiled.bind()
         description = describe(compiled.manifest(binding), Prepared.arrays_of(binding))
-        return System.of(description, carrier.load(module_of(compiled.text)), "0"), compiled.form
+        return System.from_description(description, carrier.load(module_of(compiled.text)), "0"), compiled.form
 
 
 def point(system, form, values, k):
@@ -209,10 +209,10 @@ def test_what_is_singular_by_structure_is_so_whatever_its_values():
     """Two columns with one entry, in the same row, beside a regular band; a line of 20000 sections has two such."""
     n = 1000
     dense = np.eye(n, dtype=bool) | np.eye(n, k=1, dtype=bool)
-    assert not _unmatched(_pattern(dense)).any()
+    assert not _unmatched_unknowns(_pattern(dense)).any()
     dense[:, [3, 7]] = False
     dense[5, [3, 7]] = True
-    assert _unmatched(_pattern(dense)).sum() >= 1.0
+    assert _unmatched_unknowns(_pattern(dense)).sum() >= 1.0
 
 
 def _pattern(dense):

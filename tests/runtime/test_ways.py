@@ -13,7 +13,7 @@ from sysdyn.runtime.start.held import own_residual
 from sysdyn.runtime.start.start import ConsistentState, consistent_start
 from sysdyn.runtime.start.starter import Starter
 from sysdyn.runtime.start.strategies import STRATEGIES, applicable, behind, first
-from sysdyn.runtime.structure.redundancy import nearby, reactions, vanished
+from sysdyn.runtime.structure.redundancy import nearby, reactions, vanishing_constraints
 
 
 def system_of(*parts, **more):
@@ -104,7 +104,7 @@ def test_points_beside_a_start_lie_on_its_constraints():
 @pytest.mark.parametrize(("length", "x", "y", "singular"), [(5.0, 3.0, 4.0, []), (0.0, 0.0, 0.0, [0])])
 def test_a_gradient_that_vanishes_there_alone_is_singular(length, x, y, singular):
     """(2 x, 2 y) is zero at the origin, and the circle of radius 0 has no other point."""
-    assert vanished(*rod(length, x, y)).tolist() == singular
+    assert vanishing_constraints(*rod(length, x, y)).tolist() == singular
 
 
 def test_reactions_are_the_gradients_of_constraints_scaled_to_one():

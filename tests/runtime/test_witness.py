@@ -7,7 +7,7 @@ from scipy.stats import ortho_group
 from sysdyn.runtime.linear.pencil import Descriptor
 from sysdyn.runtime.linear.tangent import Given, NoLinearisation, Outputs, rows_at
 from sysdyn.runtime.linear.witness import agrees, spread, witness
-from sysdyn.runtime.linear.witnessed import witnessed
+from sysdyn.runtime.linear.witnessed import reduce_witnessed
 from sysdyn.runtime.model.carrier import load
 from sysdyn.runtime.model.system import System
 from sysdyn.runtime.start.start import consistent_start
@@ -91,7 +91,7 @@ def test_modes_of_two_masses_twelve_decades_apart_are_all_there(stiff, loss, for
         initial={"q_x": (0.0, True), "q_y": (0.0, True), "f_x": (0.0, True), "f_y": (0.0, True)},
         form=form,
     )
-    small = witnessed(*given(made), fixed=True)
+    small = reduce_witnessed(*given(made), fixed=True)
     found = np.sort_complex(np.linalg.eigvals(small.a) if small.decomposed is None else _values(small))
     expected = np.sort_complex(np.concatenate([np.roots([1.0, loss, stiff]), np.roots([1.0, 0.1, 1.0])]))
     assert found == pytest.approx(expected, rel=1e-9, abs=0.0)
@@ -104,4 +104,4 @@ def _values(small):
 def test_equations_that_leave_something_open_are_refused():
     made = models.small("x y", "f_x**2/2", "q_x**2/2", initial={"q_x": (0.0, True), "f_x": (0.0, True)})
     with pytest.raises(NoLinearisation):
-        witnessed(*given(made), fixed=True)
+        reduce_witnessed(*given(made), fixed=True)

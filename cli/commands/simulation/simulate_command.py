@@ -140,7 +140,7 @@ def _result(ran: Ran) -> dict[str, Any]:
         "met": o.met,
         "judged": list(o.judgement.judged) if o.judgement else [],
         "not_met": [missed.to_json() for missed in o.judgement.not_met] if o.judgement else [],
-        "conserved": o.judgement.kept() if o.judgement else [],
+        "conserved": o.judgement.conserved_quantities() if o.judgement else [],
         "expects": [asdict(c) for c in ran.claims],
         "moved": change_lines(ran.prepared, ran.started.state),
         "warnings": list(o.warnings),

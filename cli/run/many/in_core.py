@@ -24,7 +24,7 @@ from sysdyn.dsl.text.diagnostics import ModelError, Report
 from sysdyn.runtime.accuracy.options import Options
 from sysdyn.runtime.many.asked import ROWS, Claim, NotApplicableError, obstacle, way_of
 from sysdyn.runtime.many.batch import Batch
-from sysdyn.runtime.model.description import stated
+from sysdyn.runtime.model.description import statements
 from sysdyn.runtime.model.failures import SolverFailure
 
 Floats = NDArray[np.float64]
@@ -112,7 +112,7 @@ class InCore:
         free, claims = _free(self.prepared), self._claims
         self.batch = Batch(way, start, self.options, keep=self._keep, thin=thin, claims=claims, free=free)
         self.at, self.written = way.system.form.at, way.system.form.written
-        self.guesses = stated(self.at, self.written, way.system.description.initial)[0]
+        self.guesses = statements(self.at, self.written, way.system.description.initial)[0]
 
     def numbers_of_run(self, binding: Binding, moving: frozenset[str]) -> tuple[Floats, Floats] | None:
         """Numbers p and initial values of one run; None where it has another structure."""
@@ -122,7 +122,7 @@ class InCore:
             return None
         if self.jumps & moving and stops(replace(self.prepared, binding=binding), self.options, Report()).size:
             return None
-        return binding.p, stated(self.at, self.written, binding.initial)[0]  # type: ignore[arg-type]
+        return binding.p, statements(self.at, self.written, binding.initial)[0]  # type: ignore[arg-type]
 
 
 def _free(prepared: Prepared) -> bool:

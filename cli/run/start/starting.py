@@ -27,7 +27,7 @@ from sysdyn.runtime.numerics.rank import NotFiniteError
 from sysdyn.runtime.numerics.work import Budget
 from sysdyn.runtime.start.moved import Moved
 from sysdyn.runtime.start.start import ConsistentState
-from sysdyn.runtime.structure.implicit import undetermined
+from sysdyn.runtime.structure.implicit import undetermined_implicits
 from sysdyn.runtime.structure.inertia import negative_inertia
 from sysdyn.runtime.structure.order import order_and_manifold
 from sysdyn.runtime.structure.structure import Structure, structure
@@ -66,13 +66,13 @@ def _find_start(
     """Find the consistent start and its structure, report what is wrong of it; None where there is none."""
     scene = prepared.network.scene
     policy = redundancy or (scene.redundancy if scene else None) or "error"
-    system = System.of(describe(prepared.structure, prepared.arrays), prepared.carrier, "3")
+    system = System.from_description(describe(prepared.structure, prepared.arrays), prepared.carrier, "3")
     # the start, then ranks and index there
     try:
         with np.errstate(all="ignore"):  # what overflows is seen as no number
             state = eventful_start(system, t0, plan(prepared, system), Budget(until))
             facts = structure(system, state)
-            implicit = undetermined(system, state, facts)
+            implicit = undetermined_implicits(system, state, facts)
     # a function that is no number explains more than the residual
     except InconsistentStart as error:
         if error.kind != "nonfinite" or not _report_undefined(prepared, system, t0, report):

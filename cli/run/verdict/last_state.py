@@ -19,7 +19,7 @@ from sysdyn.dsl.model.expression_text import to_text
 from sysdyn.dsl.model.network import Constraint
 from sysdyn.dsl.text.diagnostics import ModelError, Place
 from sysdyn.runtime.model.system import System
-from sysdyn.runtime.numerics.rank import decomposed
+from sysdyn.runtime.numerics.rank import singular_decomposition
 
 SHOWN = 4
 """Unknowns of the last good state that a finding lists."""
@@ -144,9 +144,9 @@ class LastState:
         j = gradients(self.y)
         if not np.isfinite(j).all():
             return []
-        left, sizes, _ = decomposed(j)
+        left, sizes, _ = singular_decomposition(j)
         least = sizes[-1] if len(found) <= len(names) else 0.0
-        before = 1.0 if start is None else decomposed(gradients(start))[1][-1]
+        before = 1.0 if start is None else singular_decomposition(gradients(start))[1][-1]
         if not least < LOST * before:
             return []
         # the constraints that take part in the combination

@@ -217,7 +217,7 @@ def report_stop(
 def _left_out(started: Started) -> str:
     """Constraints that the start has found redundant, as the text names them."""
     of = started.system.description
-    return ", ".join(of.rows[multiplier_row(of, k)].at(at).label for k, at in started.facts.left_out)
+    return ", ".join(of.rows[multiplier_row(of, k)].label_at(at).label for k, at in started.facts.left_out)
 
 
 def _instead_of(method: str) -> str:

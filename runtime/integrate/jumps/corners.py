@@ -61,7 +61,7 @@ class Corners:
     def _sizes(self, run: Integration) -> None:
         core, sizes = self.core, run.sizes
         core.unknowns, own = run.system.unknowns, sizes.own
-        core.magnitude, core.met, core.resolved = map(lib.pointer, (sizes.magnitude, sizes.met, sizes.resolved))
+        core.magnitude, core.met, core.resolved = map(lib.pointer, (sizes.magnitude, sizes.met, sizes.resolution))
         if own is not None:
             core.keeps, core.kept = own[0].size, self._array(own[0], np.int32)
             core.own_magnitude, core.own_met = map(lib.pointer, own[1:])

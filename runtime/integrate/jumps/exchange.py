@@ -32,7 +32,7 @@ class Exchange:
         self._members = np.searchsorted(np.flatnonzero(self._system.are("kappa", "mu")), at)
         self._weight, self._steps, self._looked = 1.0, 1, 0
 
-    def left(self, steps: int) -> int:
+    def steps_left(self, steps: int) -> int:
         """Steps to the next look, which no clock decides."""
         return max(self._looked + self._steps - steps, 1)
 
@@ -48,7 +48,7 @@ class Exchange:
         left = np.flatnonzero(~before)
         null = null_space(self._system, method.t, y, yd, left.size)
         passed, self._looked = max(method.steps - self._looked, 1), method.steps
-        if null is None or not self._turned(weight(null[self._members], left), passed):
+        if null is None or not self._turn_left_out(weight(null[self._members], left), passed):
             return False
         with run.settler.exactly():
             y, yd, _ = run.settler.settle(method.t, y, yd)
@@ -68,7 +68,7 @@ class Exchange:
         core.every_step = every
         return True
 
-    def _turned(self, weight: float, passed: int) -> bool:
+    def _turn_left_out(self, weight: float, passed: int) -> bool:
         """Whether those left out weigh too little, passed steps behind the last look; else half of the steps are let
         pass in which that may come.
         """

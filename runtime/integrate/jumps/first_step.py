@@ -55,7 +55,7 @@ class FirstStep:
             return 0.0
         if begin >= self._until:
             self._begin, self._until, self._others = begin, -np.inf, 0
-        if self._others <= FEW and AT_ONCE * self.handler.nothing < t - begin < self._unknown(which, step):
+        if self._others <= FEW and AT_ONCE * self.handler.nothing < t - begin < self._unknown_time(which, step):
             self._others += int(begin != self._begin)
             self._begin, self._until = begin, self._until if self._until > begin else end
             return WIDER * (t - begin)
@@ -63,9 +63,9 @@ class FirstStep:
 
     def at_once(self, which: Sequence[Watched], step: Step) -> bool:
         """Whether it is so near to the begin that steps behind it are to be shorter."""
-        return step[1] - step[0] < SOON * self._unknown(which, step)
+        return step[1] - step[0] < SOON * self._unknown_time(which, step)
 
-    def _unknown(self, which: Sequence[Watched], step: Step) -> float:
+    def _unknown_time(self, which: Sequence[Watched], step: Step) -> float:
         """How much (s) of the step the dense output says nothing of, but for gaps, which inertia leads."""
         contacts = self.handler.contacts
         gaps = (w.contact >= 0 and contacts.contacts[w.contact].kind == "phi" for w in which)

@@ -114,16 +114,16 @@ class Impulses:
         assigned, way[self.states] = way[self.states] != 0.0, 0.0
         if not way[self._carries].any():
             return none
-        others = self._others | (self._laws & ~self._pulsed(way))
+        others = self._others | (self._laws & ~self._rows_of_pulses(way))
         found, balanced, faithful = self._straight(before, behind, way, others)
         if not (balanced and faithful):
-            curved = self._curved(before, behind, way, (magnitude, others))
+            curved = self._gains_along_rise(before, behind, way, (magnitude, others))
             if curved is None and not self._assigned:
                 raise SolverFailure("unbalanced", behind.t, 0.0)
             found = found if curved is None else curved
         return np.where(assigned, 0.0, found)
 
-    def _pulsed(self, way: Floats) -> Mask:
+    def _rows_of_pulses(self, way: Floats) -> Mask:
         """Rows [rows] that read flows which are pulses."""
         found = np.zeros(self.system.rows, dtype=bool)
         found[self._row[self._in_y & (self._pulse(way) != 0.0)[self._column]]] = True
@@ -151,7 +151,7 @@ class Impulses:
         gains = np.stack([way, np.zeros(way.size) + impulse], axis=1).ravel()
         return self._pulses.values(*slopes) * gains[self._pulses.column]
 
-    def _gained(self, terms: Floats) -> Floats:
+    def _sums_of_terms(self, terms: Floats) -> Floats:
         """Of terms, the sums [rows]."""
         return np.asarray(np.bincount(self._pulses.row, terms, self.system.rows), dtype=np.float64)
 
@@ -161,7 +161,7 @@ class Impulses:
 
     def _rate(self, terms: Floats) -> Floats:
         """What the states gain [states]: their rows read s' - g."""
-        return -self._gained(terms)[self.rows]
+        return -self._sums_of_terms(terms)[self.rows]
 
     # -- straight ------------------------------------------------------------------------------------------------
 
@@ -198,7 +198,7 @@ class Impulses:
         rows = self._read
         if not rows.size:
             return
-        left, size = (self._gained(w)[rows] for w in (terms, np.abs(terms)))
+        left, size = (self._sums_of_terms(w)[rows] for w in (terms, np.abs(terms)))
         if (missed := np.abs(left) > BROKEN * size).any():
             raise SolverFailure("pulsed", t, 0.0, self._state_of(rows[np.argmax(missed)]))
 
@@ -219,11 +219,11 @@ class Impulses:
         """
         pulses = self._pulses
         at = np.flatnonzero(self._balances[pulses.row] & (pulses.column % 2 == 1))
-        aim = -self._gained(self._terms(slopes, way))
+        aim = -self._sums_of_terms(self._terms(slopes, way))
         entries = pulses.row[at], pulses.column[at] // 2, pulses.values(*slopes)[at]
         impulse = least_measured(entries, aim, np.full(way.size, np.nan))
         terms = np.where(self._balances[pulses.row], self._terms(slopes, way, impulse), 0.0)
-        size, left = self._gained(np.abs(terms)), self._gained(terms)
+        size, left = self._sums_of_terms(np.abs(terms)), self._sums_of_terms(terms)
         return impulse, bool((np.abs(left) <= BROKEN * size.max(initial=0.0))[self._balances].all())
 
     def _holds(self, sides: tuple[Side, Side], part: float, y: Floats, others: Mask) -> bool:
@@ -235,21 +235,23 @@ class Impulses:
 
     # -- curved --------------------------------------------------------------------------------------------------
 
-    def _curved(self, before: Side, behind: Side, way: Floats, along: tuple[Floats, Mask]) -> Floats | None:
+    def _gains_along_rise(self, before: Side, behind: Side, way: Floats, along: tuple[Floats, Mask]) -> Floats | None:
         """The gains [states] along the rise itself; None where rows do not tell it: it ends elsewhere.  along:
         magnitudes [unknowns], rows [rows] that hold at each point.
         """
         (magnitude, others), last = along, None
         size = np.maximum(magnitude, np.abs(way))
         for number in PARTS:
-            y, gained = self._followed((before, behind), size, others, number)
+            y, gained = self._integrate_rise((before, behind), size, others, number)
             if last is not None and (np.abs(gained - last) <= AGREED * np.abs(gained).max(initial=0.0)).all():
                 near = np.abs(y - before.y - way) <= AWAY * size
                 return gained if near[self._carries].all() else None
             last = gained
         return None
 
-    def _followed(self, sides: tuple[Side, Side], size: Floats, others: Mask, number: int) -> tuple[Floats, Floats]:
+    def _integrate_rise(
+        self, sides: tuple[Side, Side], size: Floats, others: Mask, number: int
+    ) -> tuple[Floats, Floats]:
         """Y [unknowns] and gains [states] at the end, in a number of steps of the classical Runge-Kutta method."""
         before, behind = sides
         y, gained, step = before.y.copy(), np.zeros(self.states.size), 1.0 / number

@@ -66,7 +66,7 @@ class Told:
     assigns: tuple[tuple[str, str, str, slice, slice], ...]
     entries: tuple[Happened, ...]
 
-    def at(self, t: float, values: Sequence[float]) -> list[Happened]:
+    def entries_at(self, t: float, values: Sequence[float]) -> list[Happened]:
         """The entries at t (s); values: before and after of each assignment."""
         found = [
             Happened(t, name, element, said % tuple(values[before]), said % tuple(values[after]))
@@ -177,7 +177,7 @@ class Modes:
         core.state = self._array(run.roles.state[: run.system.form.written], np.int32)
         core.differential = self._array(run.roles.differential, np.int32)
         core.unnamed, core.met = self._array(run.sizes.unnamed, np.int32), lib.pointer(run.sizes.met)
-        core.magnitude, core.resolved = lib.pointer(run.sizes.magnitude), lib.pointer(run.sizes.resolved)
+        core.magnitude, core.resolved = lib.pointer(run.sizes.magnitude), lib.pointer(run.sizes.resolution)
         core.rate = lib.pointer(run.start_rate)
         core.t_end, core.h_max = (c.addressof(method) + getattr(type(method), f).offset for f in ("t_end", "h_max"))
         for name in ("y", "yd", "before", "before_d", "restart", "restart_d"):
@@ -214,11 +214,13 @@ class Modes:
 
     # -- between the core and the handler ------------------------------------------------------------------------
 
-    def told(self) -> bool:
+    def inform_handler(self) -> bool:
         """The handler stands where the core does, and knows what has happened; whether any event has."""
         core, handler = self.core, self.handler
         for row in self._log[: core.logged].tolist():
-            handler.happened += self._turned(row) if row[1] < 0.0 else self._told[int(row[1])].at(row[0], row[2:])
+            handler.happened += (
+                self._entry_of_law(row) if row[1] < 0.0 else self._told[int(row[1])].entries_at(row[0], row[2:])
+            )
         some, core.logged = bool(core.logged), 0
         number = core.base if core.now == lib.OWN else core.now
         if number >= 0:
@@ -244,7 +246,7 @@ class Modes:
             for array, value in zip(self._flights, astuple(bounce), strict=True):
                 array[row] = value
 
-    def _turned(self, row: Sequence[float]) -> list[Happened]:
+    def _entry_of_law(self, row: Sequence[float]) -> list[Happened]:
         """The entry of a law whose branch the core turned: time (s), -1 - its number, its branches."""
         kink = self.handler.plan.kinks[-1 - int(row[1])]
         told = Happened(row[0], kink.name, kink.element, WORDS[row[2]], WORDS[row[3]])
@@ -268,17 +270,17 @@ class Modes:
         number = len(self._states)
         if number >= MOST:
             return -1
-        self._modes = _grown(self._modes, number)
-        self._modes[number] = self._described()
+        self._modes = _grow(self._modes, number)
+        self._modes[number] = self._describe_mode()
         self.core.mode = c.addressof(self._modes)
         self._states.append((self.handler.side.copy(), self.handler.truth.copy(), key[2]))
         self._number[key] = number
         return number
 
-    def _described(self) -> Any:
+    def _describe_mode(self) -> Any:
         """The handler's present mode as the core's structure."""
         handler, held = self.handler, (lib.Held * len(self._systems))()
-        watched = handler.watched()
+        watched = handler.all_watched()
         if len(watched) > self._watches:
             self._room(2 * len(watched))
         for k, system in enumerate(self._systems):
@@ -307,7 +309,7 @@ class Modes:
         """
         (crossed, due), (flipped, point, before) = what, moved
         handler, number = self.handler, len(self._told)
-        if begin < 0 or number >= MANY or not self._determined(t, point):
+        if begin < 0 or number >= MANY or not self._is_determined(t, point):
             return
         strike = None if handler.simple else self._strike(t, point)
         flows = any(a.kind == "flow" for r in handler.rounds for group in r.groups for a in group)
@@ -327,7 +329,7 @@ class Modes:
         if anywhere and self._anywhere[handler.struck] >= 0:
             return
         self._tried[repr(same)] += 1
-        self._transitions = _grown(self._transitions, number)
+        self._transitions = _grow(self._transitions, number)
         entries = tuple(handler.happened[before:])
         self._transitions[number] = lib.Transition(
             number=number,
@@ -377,7 +379,7 @@ class Modes:
         one = self._strikes[-1]
         return 0 if one is None else one.address
 
-    def _determined(self, t: float, point: Any) -> bool:
+    def _is_determined(self, t: float, point: Any) -> bool:
         """Whether the mode leaves nothing open at t (s)."""
         handler = self.handler
         if point is None or not handler.plan.contacts:
@@ -386,11 +388,11 @@ class Modes:
 
     def places(self, which: Sequence[Watched]) -> list[int]:
         """Numbers of these among what is watched."""
-        watched = self.handler.watched()
+        watched = self.handler.all_watched()
         return [watched.place(w) for w in which]
 
 
-def _grown(array: Any, number: int) -> Any:
+def _grow(array: Any, number: int) -> Any:
     """The same structures with room for one more at `number`."""
     if number < len(array):
         return array

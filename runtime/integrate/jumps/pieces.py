@@ -100,22 +100,22 @@ class Pieces:
         if self.modes is not None:
             self._mode = self.modes.stands()
 
-    def _told(self) -> None:
+    def _inform_handler(self) -> None:
         """The handler knows what the core has done without it."""
         if self.modes is None:
             return
-        if self.modes.told() or self.modes.core.at != self.at:
+        if self.modes.inform_handler() or self.modes.core.at != self.at:
             self._landing = np.inf
         self._mode, self.at = self.modes.core.now, self.modes.core.at
 
-    def happened(self) -> tuple[Happened, ...]:
+    def past_events(self) -> tuple[Happened, ...]:
         """The events so far."""
-        self._told()
+        self._inform_handler()
         return tuple(self.handler.happened)
 
     def floating(self, t: float, y: Floats, yd: Floats) -> dict[int, tuple[str, ...]]:
         """Rows of block observe that nothing determined at times, at the end of a run; y, yd [unknowns as written]."""
-        self._told()
+        self._inform_handler()
         self.handler.choices.end(t, y, yd)
         return self.handler.choices.found
 
@@ -125,14 +125,14 @@ class Pieces:
         if modes is None:
             return handler.fire(t, *before, samples=due, which=which)
         crossed, begin, events = modes.places(which), self._mode, len(handler.happened)
-        flipped = self._flipped(which)
+        flipped = self._flip_sides(which)
         point = handler.fire(t, *before, samples=due, which=which)
         if not (which and handler.stands(which)):
             modes.learn(begin, t, (crossed, due), (flipped, point, events))
         self._mode = modes.stands()
         return point
 
-    def _flipped(self, which: Sequence[Watched]) -> Floats:
+    def _flip_sides(self, which: Sequence[Watched]) -> Floats:
         """The sides of all relations, of those that cross the other ones [relations]."""
         flipped = self.handler.side.copy()
         for w in which:
@@ -204,7 +204,7 @@ class Pieces:
         began = time.process_time()
         run, core, method = self.run, self.run.driver.run, self.run.method.contents
         stepper = method.stepper
-        self._told()
+        self._inform_handler()
         self.handler.before = self.handler.now()
         sides, truth = self.handler.side.copy(), self.handler.truth.copy()
         if stepper.refine:
@@ -214,7 +214,7 @@ class Pieces:
         reach = core.t_seen
         while True:
             seen = reach if begin < reach < end else end
-            found = self.handler.crossed(self._values, begin, seen)
+            found = self.handler.first_crossing(self._values, begin, seen)
             if found is None and seen < end:
                 begin, reach = seen, seen + WIDER * (seen - begin)
                 continue
@@ -233,7 +233,7 @@ class Pieces:
             self.handler.observer.know(run.driver.largest())  # what it has met in this flight, whose ends are zeros
             with run.settler.exactly():
                 before = self._point(t)
-                which += self._met(t, before, which)
+                which += self._crossing_together(t, before, which)
                 point = self._fire(t, before, [], which)
             if point is not None:
                 kind = 0 if self.handler.kinks.only_peaks(which) else TRACE
@@ -262,7 +262,7 @@ class Pieces:
         """The instant (s) from which the last step is searched."""
         return float(self.run.driver.run.t_from if self.modes is None else self.modes.core.begin)
 
-    def _met(self, t: float, point: Point, known: Sequence[Watched] = ()) -> list[Watched]:
+    def _crossing_together(self, t: float, point: Point, known: Sequence[Watched] = ()) -> list[Watched]:
         """The relations beside the known ones that cross zero at t (s) too, but for round-off: one instant for all."""
         handler = self.handler
         asked = handler.side != 0.0
@@ -270,12 +270,12 @@ class Pieces:
         step = (t - self._from) / PARTS
         if not asked.any() or step <= handler.nothing:
             return []
-        watched, values = handler.watched(), handler.observer(t, *point)
+        watched, values = handler.all_watched(), handler.observer(t, *point)
         near = np.abs(values[watched.row]) <= SMALL * handler.observer.largest[watched.row]
         near &= (watched.relation >= 0) & np.append(asked, False)[watched.relation]
         if not near.any():
             return []
-        watched, low, here = watched.of(near), self._values(t - step), self._values(t)
+        watched, low, here = watched.select(near), self._values(t - step), self._values(t)
         rate = watched.side * (low[watched.row] - here[watched.row]) / step
         falls = (rate > 0.0) & (watched.side * here[watched.row] <= rate * handler.nothing)
         return watched.each(falls)
@@ -348,7 +348,7 @@ class Pieces:
     def sample(self, sink: Sink) -> bool:
         """What is due where a piece has met its end; whether the segment goes on."""
         run, method = self.run, self.run.method.contents
-        self._told()
+        self._inform_handler()
         end = self._end
         jumps = method.t >= end and self.at + 1 < len(run.segments)  # the text, which is first
         due = [] if jumps else self.handler.due(method.t)
@@ -363,7 +363,7 @@ class Pieces:
             with run.settler.exactly():
                 y, yd, _ = run.settler.settle(method.t, y[:n], yd[:n])
                 self.handler.before = self.handler.now()
-                point = self._fire(method.t, (y, yd), due, self._met(method.t, (y, yd)))
+                point = self._fire(method.t, (y, yd), due, self._crossing_together(method.t, (y, yd)))
             run.driver.drain(sink)
             self.aim()
             if point is not None:
@@ -374,14 +374,14 @@ class Pieces:
         """The point behind the instant at which the text jumps, where the next segment begins; what happens has its
         rows.
         """
-        self._told()
+        self._inform_handler()
         handler, modes, t, begin = self.handler, self.modes, segment.begin, self._mode
         handler.before, events = handler.now(), len(handler.happened)
-        due, which = handler.due(t), handler.turned(t, y, yd)
-        which += self._met(self.run.method.contents.t, (y, yd), which)
-        crossed, flipped = modes.places(which) if modes is not None else [], self._flipped(which)
+        due, which = handler.due(t), handler.turned_relations(t, y, yd)
+        which += self._crossing_together(self.run.method.contents.t, (y, yd), which)
+        crossed, flipped = modes.places(which) if modes is not None else [], self._flip_sides(which)
         found = handler.fire(t, y, yd, samples=due, which=which) if due or which else None
-        point = found or handler.anew(t, y, yd)
+        point = found or handler.restart_at_jump(t, y, yd)
         if modes is not None and not due:
             modes.learn(begin, t, (crossed, None), (flipped, point, events))
         handler.happened[events:] = [replace(h, time=segment.label) for h in handler.happened[events:]]

@@ -46,18 +46,18 @@ def struck(handler: Handler, k: int, t: float, y: Floats, yd: Floats) -> Balance
         family, position = handler.contacts.switches.places[contact.number]
         row = int(first["phi_rate", multiplier_row(system.description, family)]) + position
         place, over = handler.contacts.multiplier, system.of_groups("dynamics")
-        part, rows = _reached(system, (behind, over), (system.are("f", "p", "e"), acts), place[k])
+        part, rows = _connected_part(system, (behind, over), (system.are("f", "p", "e"), acts), place[k])
         found = Balance(system, (t, y, yd), (behind, over), (part & ~acts, part & acts))
         pushed = np.unique(system.pattern.columns_of()[(rows & over)[system.pattern.row]])
         gaps = np.flatnonzero([c.kind == "phi" for c in handler.plan.contacts])
-        found.beside(gaps[np.isin(np.array(place)[gaps], pushed) & (gaps != k)])
+        found.other_gaps(gaps[np.isin(np.array(place)[gaps], pushed) & (gaps != k)])
         return found.of_gap(k, row, place[k], contact.restitution) if found.ready else None
     finally:
         handler.contacts.active[:] = active
         handler.contacts.apply()
 
 
-def _reached(
+def _connected_part(
     system: System, rows: tuple[Mask, Mask], unknowns: tuple[Mask, Mask], multiplier: int
 ) -> tuple[Mask, Mask]:
     """Unknowns and rows [unknowns], [rows] of the connected part of a multiplier in the equations of `Balance`."""
@@ -108,7 +108,7 @@ class Balance:
         self._laid_out(system, (own, columns, over[own]), entries, rated)
         self.ready = True
 
-    def beside(self, gaps: Ints) -> None:
+    def other_gaps(self, gaps: Ints) -> None:
         """Other gaps that the impulse reaches."""
         if self.ready:
             self._keep.append(np.ascontiguousarray(gaps, dtype=np.int32))

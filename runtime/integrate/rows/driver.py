@@ -37,7 +37,7 @@ CREDIT = 16
 """Rows that are looked at before it shows that few of them meet their sums."""
 
 
-def _audited(system: System) -> Ints:
+def _audit_places(system: System) -> Ints:
     """Places of the members of the audit in y, in the order of core/run/run.h; -1 where there is none."""
     found = np.full(7, -1, dtype=np.int32)
     order = ("energy", "kinetic", "potential", "dissipated", "supplied", "constraints", "drift")
@@ -89,7 +89,7 @@ class Driver:
         if self._least_norm is not None:
             run.least_norm = self._least_norm.address
         self._observers(start_rate)
-        self._asked(request)
+        self._ask_for_rows(request)
         self._extrema(request)
         self._branches(request, method, settler)
         run.rough = request.settled_to
@@ -111,10 +111,10 @@ class Driver:
         run.rated = int(any(k.rates is None or k.rates for k in audited))
         for name, call in self.calls.items():
             setattr(run, name, None if call is None else c.addressof(call))
-        self._audit_at = system.once("audited", lambda: _audited(system))
+        self._audit_at = system.once("audited", lambda: _audit_places(system))
         run.audit_at, run.start_rate = lib.pointer(self._audit_at), lib.pointer(start_rate)
 
-    def _asked(self, request: Request) -> None:
+    def _ask_for_rows(self, request: Request) -> None:
         """Where rows are wanted, and the room for them."""
         run, width = self.run, lib.ROW_HEAD + 2 * self.observed
         self._instants = np.ascontiguousarray(request.instants, dtype=np.float64)

@@ -56,7 +56,7 @@ def turned_over(balances: Iterable[Balance]) -> float:
     return sum(b.turnover for b in balances if b.kind == "energy" and b.unit == "J")
 
 
-def _kept(system: System) -> tuple[list[tuple[str, str, RowLabel]], list[RowFamily], Ints, Signs]:
+def _ledger_rows(system: System) -> tuple[list[tuple[str, str, RowLabel]], list[RowFamily], Ints, Signs]:
     """Label, unit and first element of each ledger; rows of the elements; of each of these families its ledger; of each
     element whether it is an inertia.
     """
@@ -66,14 +66,14 @@ def _kept(system: System) -> tuple[list[tuple[str, str, RowLabel]], list[RowFami
     sizes = [row.size for row in families]
     of = np.array([int(row.kind.split()[0]) for row in families], dtype=np.int32)
     inertia = np.repeat([*("inertia" in row.kind for row in families), False], [*sizes, 1]).astype(np.int8)
-    return [(row.label, row.unit, row.at(0)) for row in heads], families, of, inertia
+    return [(row.label, row.unit, row.label_at(0)) for row in heads], families, of, inertia
 
 
 class Ledgers:
     """The core's structure for the ledgers of a system."""
 
     def __init__(self, system: System) -> None:
-        self._heads, self._families, of, self._inertia = system.once("ledgers", lambda: _kept(system))
+        self._heads, self._families, of, self._inertia = system.once("ledgers", lambda: _ledger_rows(system))
         count, elements = len(self._heads), self._inertia.size - 1
         self._end = np.cumsum([row.size for row in self._families], dtype=np.int32)
         names = ("gross", "largest", "stored", "balance", "highest", "dissipated", "supplied")
@@ -109,7 +109,7 @@ class Ledgers:
         """Of an element by its number."""
         for row in self._families:
             if element < row.size:
-                return row.at(element)
+                return row.label_at(element)
             element -= row.size
         raise IndexError(element)
 

@@ -52,8 +52,8 @@ class Settlers:
         self._common = roles.common[:n]
         t, y, yd = point
         self._point = (t, y[:n], yd[:n]) if system.unknowns <= RATED else None
-        self.settler = self._by_basis(self.of("settled" if forms is not None else self.whole_form))
-        self.of_trace = self._by_basis(self.of("valued")) if self._values_do() else self.settler
+        self.settler = self._by_basis(self.settler_of("settled" if forms is not None else self.whole_form))
+        self.of_trace = self._by_basis(self.settler_of("valued")) if self._values_do() else self.settler
 
     def _by_basis(self, settler: Settler) -> Settler:
         """Told how far it may go by basic solutions, and how well points settle."""
@@ -113,7 +113,7 @@ class Settlers:
         settled = system.another("settled")
         return "rated" if flows_open(settled, *self._point, self.keeps, turning=turning) else "settled"
 
-    def of(self, name: str, state: NDArray[np.bool_] | None = None, *, whole: bool = False) -> Settler:
+    def settler_of(self, name: str, state: NDArray[np.bool_] | None = None, *, whole: bool = False) -> Settler:
         """Of the rows of a form; state: what should move least, if not what carries the state; whole: with every
         unknown, whatever leaves the runs.
         """
@@ -129,14 +129,14 @@ class Settlers:
         """Of the constraints alone, onto which accepted points are moved; None where no row lets them drift."""
         if self.system.form.name not in PROJECTED:
             return None
-        return self.of("constraints", np.ones(self.system.form.written, dtype=bool))
+        return self.settler_of("constraints", np.ones(self.system.form.written, dtype=bool))
 
     @cached_property
     def restart(self) -> Restart:
         """Finds consistent points behind jumps, with every unknown."""
         settler = self.settler
         if self._forms is not None:
-            settler = self.of(self.whole_form, whole=True)
+            settler = self.settler_of(self.whole_form, whole=True)
             settler.by_basis(0.0, determined=True)
         return Restart(settler, self.keeps)
 
@@ -148,7 +148,7 @@ class Settlers:
             found = still(self.settler, t, (y, yd), self.keeps, self._sizes.magnitude[: self.system.form.written])
             if found is not None:
                 return found
-        return self.restart.across(t, y if self._forms is None else self._forms.completed(t, y), yd)
+        return self.restart.across(t, y if self._forms is None else self._forms.complete_point(t, y), yd)
 
     def rest(self) -> None:
         """Of a large system: lets go of the room in which points behind a jump were settled."""

@@ -13,7 +13,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 from sysdyn.runtime import tuning
-from sysdyn.runtime.model.description import Floats, Ints, stated
+from sysdyn.runtime.model.description import Floats, Ints, statements
 from sysdyn.runtime.model.scales import alike, group_maxima, group_maximum
 from sysdyn.runtime.model.system import System
 from sysdyn.runtime.numerics.equilibrate import sparse_factors
@@ -61,7 +61,7 @@ def left_open(system: System, t: float, last: tuple[Floats, Floats, Floats], ste
     places = y, y + BESIDE * met
     beside = tuple((place, system.observe(t, place, yd), system.ledgers(t, place, yd)) for place in places)
     found = LeftOpen(*map(np.zeros_like, beside[0][1:]))
-    given = _given(system)
+    given = _initial_sizes(system)
     said = given > 0.0
     for change in _changes(system, (t, y, yd), met, step):
         if (np.abs(change)[said] > given[said]).any():
@@ -93,7 +93,7 @@ def _changes(system: System, point: tuple[float, Floats, Floats], met: Floats, s
     """Changes of the unknowns [unknowns] by which rows at a point (t, y, yd) are off by their round-off; met
     [unknowns]: how large each counts in a row.
     """
-    scaled = _scaled(system, point, met, step)
+    scaled = _scaled_jacobian(system, point, met, step)
     if scaled is None:
         return
     entries, of_column, counts = scaled
@@ -105,7 +105,7 @@ def _changes(system: System, point: tuple[float, Floats, Floats], met: Floats, s
         del change
 
 
-def _scaled(
+def _scaled_jacobian(
     system: System, point: tuple[float, Floats, Floats], met: Floats, step: float
 ) -> tuple[tuple[Ints, Ints, Floats], Floats, NDArray[np.bool_]] | None:
     """The Jacobian of a step by its entries, in magnitudes of unknowns and terms of rows; these magnitudes [unknowns];
@@ -125,7 +125,7 @@ def _scaled(
     del terms, jy, jyd  # of a large system the room counts, here and below
     if not (np.isfinite(values).all() and np.isfinite(size).all()):
         return None
-    size, brought = _eliminated(system, (rows, columns, values), size)
+    size, brought = _terms_of_elimination(system, (rows, columns, values), size)
     # in magnitudes: what an elimination leaves of the largest unknown is no change of one that is small by its unit; a
     # unit of which there is no more than its round-off has no magnitude of its own
     met = np.where(met > EPS * brought, met, brought)
@@ -136,13 +136,13 @@ def _scaled(
     return ((rows, columns, values), of_column, size > 0.0) if np.isfinite(values).all() else None
 
 
-def _given(system: System) -> Floats:
+def _initial_sizes(system: System) -> Floats:
     """Largest initial value that the text gives an unknown of its kind and unit [unknowns]."""
-    values, *_ = stated(system.form.at, system.unknowns, system.description.initial)
+    values, *_ = statements(system.form.at, system.unknowns, system.description.initial)
     return group_maxima(system, np.abs(values))[alike(system)]
 
 
-def _eliminated(system: System, entries: tuple[Ints, Ints, Floats], size: Floats) -> tuple[Floats, Floats]:
+def _terms_of_elimination(system: System, entries: tuple[Ints, Ints, Floats], size: Floats) -> tuple[Floats, Floats]:
     """Terms [rows] with those that elimination brings into a row, of the rows that are pivots of its columns; what it
     brings there of each unknown [unknowns].
     """

@@ -42,7 +42,7 @@ class Sizes:
     def __init__(self, system: System, start: ConsistentState, request: Request, origin: Origin) -> None:
         self.system, self._start, self._request = system, start, request
         self._origin: Origin | None = origin
-        found, self.time = origin.sized(request.t_end)
+        found, self.time = origin.initial_sizes(request.t_end)
         if request.ceiling is not None:
             found = np.minimum(found, request.ceiling)
         self._magnitude: Floats = np.maximum(found, self.least)
@@ -101,7 +101,7 @@ class Sizes:
         return self._met
 
     @cached_property
-    def resolved(self) -> Floats | NDArray[np.int16]:
+    def resolution(self) -> Floats | NDArray[np.int16]:
         """|y| of which is known what round-off leaves open [unknowns], by powers of two where the core does not read it
         too.
         """
@@ -109,9 +109,9 @@ class Sizes:
         rough = number > LARGE and not self._request.events  # (core/run/events/modes.h)
         return np.full(number, NO_POWER, dtype=np.int16) if rough else np.zeros(number)
 
-    def _grown(self, y: Floats) -> bool:
+    def _has_grown(self, y: Floats) -> bool:
         """Whether some |y| may be more than twice what it was when asked before; it is as large as now, then."""
-        known = self.resolved
+        known = self.resolution
         size, most = (_powers(y), known) if known.dtype == np.int16 else (np.abs(y), 2.0 * known)
         if (size <= most).all():
             return False
@@ -136,7 +136,7 @@ class Sizes:
         """Of a method of fewer unknowns: their places, magnitudes and |y| met; None where it steps all."""
         return None if self._own is None else (whole_of(self._own[0]), *self._own[1:])
 
-    def stepped(self, kept: Ints | None) -> tuple[Floats, Floats]:
+    def sizes_of_method(self, kept: Ints | None) -> tuple[Floats, Floats]:
         """Magnitude and |y| met of the unknowns that the method steps; kept: their places, None: all."""
         if kept is None:
             return self.magnitude, self.met
@@ -158,7 +158,7 @@ class Sizes:
         if self._own is not None:
             self._own[1][:] = self.magnitude[whole_of(self._own[0])]
 
-    def at(self, y: Floats, *, last: bool = False) -> tuple[Floats, Floats]:
+    def sizes_at(self, y: Floats, *, last: bool = False) -> tuple[Floats, Floats]:
         """Largest |y| met and magnitude of every unknown; what was eliminated is as large as at the last point y.
         last: in the arrays of the run, which is over.
         """
@@ -201,7 +201,7 @@ class Sizes:
         """No magnitude asks for more than round-off leaves: contents that grew are summed where flows are zero; rate
         [unknowns]: of what has one.
         """
-        if not self._grown(y):
+        if not self._has_grown(y):
             return
         spared = self.system.unknowns > LARGE and self._own is not None
         if spared:
@@ -224,7 +224,7 @@ class Sizes:
         blocks, beside large ones) has none.
         """
         open_ = open_unknowns(self.system, t, y, yd, self.time)
-        self._at_least(np.where(carries & (self.at(y)[0] > open_), 0.0, open_))
+        self._at_least(np.where(carries & (self.sizes_at(y)[0] > open_), 0.0, open_))
 
     @property
     def resolves(self) -> float:

@@ -27,7 +27,7 @@ class Told:
         # below what round-off leaves of a magnitude nothing is asked: --atol 0 meets zeros
         atol = None if request.atol is None else np.maximum(request.atol, ROUND_OFF * sizes.magnitude)
         self.atol = atol if atol is None or kept is None else atol[kept]
-        self.magnitude, self.met = sizes.stepped(kept)
+        self.magnitude, self.met = sizes.sizes_of_method(kept)
         self.test, self.power, self.smooth = roles.test, roles.power, roles.smooth.astype(np.int8)
         if kept is not None:  # as where their rates are unknowns too: rows q' = f pull at nothing
             self.smooth[roles.smooth & system.are("q")[kept]] = UNPULLED

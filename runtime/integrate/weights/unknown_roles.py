@@ -74,7 +74,7 @@ class Roles:
         begin = np.flatnonzero(np.diff(self.common[order], prepend=-1))
         return np.append(begin, order.size).astype(np.int32), order
 
-    def kept(self, places: Ints) -> Roles:
+    def select(self, places: Ints) -> Roles:
         """The roles of these unknowns; a group of which others leave is none."""
         common = self.common
         if (common >= 0).any():
