@@ -2,7 +2,7 @@
 
 from sysdyn.distribution import warn_of_other
 
-__version__ = "0.1.0"
+__version__ = "0.2.0"
 """As `pyproject.toml` has it (a test compares them): reading it from the installed metadata costs 12 ms a command."""
 
 warn_of_other()

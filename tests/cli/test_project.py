@@ -148,7 +148,7 @@ def test_the_other_project_of_this_name_is_told_by_doctor(tmp_path, monkeypatch,
 
 
 ORIGINS = {
-    None: "sysdyn-compiler==0.1.0",
+    None: "sysdyn-compiler==0.2.0",
     '{"url": "https://host.example/a/sysdyn", "vcs_info": {"vcs": "git", "commit_id": "5eb3119a"}}': (
         '"sysdyn-compiler @ git+https://host.example/a/sysdyn@5eb3119a"'
     ),
