@@ -84,18 +84,16 @@ class Restart:
         """
         known = self.magnitude(y.size)
         try:
-            found = self._struck(t, y, yd, known, quickly=quickly, among=True)
+            found = self._struck(t, y, yd, known, quickly=quickly)
         except UnbalancedError:
             found = None
         lib.reader(self.settler.core.contents.scale, y.size)[:] = known
         return None if found is None or not found[3] else found[:3]
 
     def _struck(
-        self, t: float, y: Floats, yd: Floats, magnitude: Floats, *, quickly: bool = False, among: bool = False
+        self, t: float, y: Floats, yd: Floats, magnitude: Floats, *, quickly: bool = False
     ) -> tuple[Floats, Floats, Floats, bool] | None:
-        """The same, and whether rates of rows are met too; magnitude [unknowns as written] before it; among: of one set
-        of constraints among others, most of which have no point: by Newton's method alone.
-        """
+        """The same, and whether rates of rows are met too; magnitude [unknowns as written] before it."""
         before, yd = y, yd.copy()
         yd[self.settler.system.idle_multipliers()] = 0.0  # what does not hold any more pushes no more
         same, moved = _held(self.settler, t, (y, yd), magnitude)
@@ -104,7 +102,7 @@ class Restart:
             return *same, np.zeros(y.size), self._lives
         # a switch that opens on a coil: the exponential law beside it bears its current, and no store jumps
         if self.settler.system.form.scales and not quickly:
-            steep = self._search(t, y, yd, free=False, quickly=among)
+            steep = self._search(t, y, yd, free=False)
             if steep is not None and (kept := still(self.settler, t, steep, self.state, magnitude)) is not None:
                 return *kept, np.zeros(y.size), True
         push = None
@@ -122,7 +120,7 @@ class Restart:
         if quickly or unmet(self.settler, t, y, yd, self.settler.alone(self.state)):
             return None
         # what follows is sought from where it was: impulses move it along slopes that steep laws had before the jump
-        searched = self._search(t, np.where(self.state, y, before), yd, quickly=among)
+        searched = self._search(t, np.where(self.state, y, before), yd)
         stays = searched is not None and self._stays(searched[0], y, magnitude)
         return (*searched, impulse, True) if searched is not None and stays else None
 
@@ -152,12 +150,8 @@ class Restart:
         """Magnitudes [number] of the first unknowns."""
         return lib.reader(self.settler.core.contents.scale, number).copy()
 
-    def _search(
-        self, t: float, y: Floats, yd: Floats, *, free: bool = True, quickly: bool = False
-    ) -> tuple[Floats, Floats] | None:
-        """The same as a start finds it: first with the state held, then (free) with everything free; quickly: by
-        Newton's method alone.
-        """
+    def _search(self, t: float, y: Floats, yd: Floats, *, free: bool = True) -> tuple[Floats, Floats] | None:
+        """The same as a start finds it: first with the state held, then (free) with everything free."""
         starter = Starter(self.settler.system.another("3"))
         starter.every &= ~starter.groups("initial")
         # nothing is known behind a jump by what was next to zero before it, rates least of all
@@ -169,11 +163,7 @@ class Restart:
         guess[idle], state[: y.size] = 0.0, self.state
         for held in (state, np.zeros_like(state))[: 1 + free]:
             may = ~(idle | held)
-            found = (
-                None
-                if contradicting(starter, t, guess, may) is not None
-                else behind(starter, t, guess, may, quickly=quickly)
-            )
+            found = None if contradicting(starter, t, guess, may) is not None else behind(starter, t, guess, may)
             if found is not None:
                 return starter.expand(found)
         return None

@@ -314,11 +314,11 @@ def applicable(
             yield name, strategy
 
 
-def behind(starter: Starter, t: float, x: Floats, free: Mask, *, quickly: bool = False) -> Floats | None:
+def behind(starter: Starter, t: float, x: Floats, free: Mask) -> Floats | None:
     """A point behind a jump at which all rows hold that must, from x; None where none was found.  A step of 10 V across
     a diode makes steep laws lie far behind it.
     """
-    ways = [way for _, way in applicable(starter, t, x, free, quickly=quickly)]
+    ways = [way for _, way in applicable(starter, t, x, free)]
     with np.errstate(all="ignore"):  # an exponential may be beyond the largest number on the way, where nothing holds
         found, holds = first((found for way in ways for found in way(starter, t, x, x, free)), x)
     return found.x if holds else None

@@ -25,7 +25,7 @@ scene run of bridge { time 0 s to 50 ms; trace R.f, z every 0.1 ms; accuracy 1e-
 def test_sets_that_short_the_source_are_refused_by_linear_algebra(tmp_path, monkeypatch):
     """The source is zero where they are tried, its rate is not: all strategies of a start were asked, 0.6 s each."""
     searched = []
-    monkeypatch.setattr(restart, "behind", lambda *given, **_: searched.append(given))
+    monkeypatch.setattr(restart, "behind", lambda *given: searched.append(given))
     file = tmp_path / "m.sd"
     file.write_text(TEXT)
     found = simulate(file, output=tmp_path / "a.h5")
