@@ -89,7 +89,9 @@ class Rows:
 
 def _alike(a: Floats, b: Floats) -> Mask:
     """Where slopes are the same; one beyond the largest number is like none."""
-    return np.asarray(np.isfinite(a) & (np.abs(np.where(np.isfinite(b), b, np.inf) - a) <= ALIKE * np.abs(a)))
+    both = np.isfinite(a) & np.isfinite(b)
+    a, b = np.where(both, a, 0.0), np.where(both, b, np.inf)
+    return np.asarray(both & (np.abs(b - a) <= ALIKE * np.abs(a)))
 
 
 def unmet(settler: Settler, t: float, y: Floats, yd: Floats, state: Mask) -> bool:
