@@ -54,6 +54,7 @@ class Restart:
 
     def __init__(self, settler: Settler, state: NDArray[np.bool_]) -> None:
         self.settler, self.state, self.sums = settler, state, True
+        self._contradicts = False  # linear rows leave no point with the state held
         self.instant = Instant(settler.system)
 
     def across(self, t: float, y: Floats, yd: Floats) -> tuple[Floats, Floats] | None:
@@ -105,6 +106,9 @@ class Restart:
             steep = self._search(t, y, yd, free=False)
             if steep is not None and (kept := still(self.settler, t, steep, self.state, magnitude)) is not None:
                 return *kept, np.zeros(y.size), True
+            # no linear row asks for an impulse: contents that would jump all the same are those of a search that failed
+            if steep is None and not self._contradicts:
+                return None
         push = None
         if same is None or moved[self.settler.system.kinds == "q"].any():
             y, push = self.instant.displacements(t, y, yd, magnitude, sums=self.sums)
@@ -163,7 +167,8 @@ class Restart:
         guess[idle], state[: y.size] = 0.0, self.state
         for held in (state, np.zeros_like(state))[: 1 + free]:
             may = ~(idle | held)
-            found = None if contradicting(starter, t, guess, may) is not None else behind(starter, t, guess, may)
+            self._contradicts = contradicting(starter, t, guess, may) is not None
+            found = None if self._contradicts else behind(starter, t, guess, may)
             if found is not None:
                 return starter.expand(found)
         return None
