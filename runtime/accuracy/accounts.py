@@ -53,6 +53,7 @@ class Accounts:
     def progress(self, t: float, *, another: bool) -> None:
         """A run has come to t (s); another: a run behind it is foreseen."""
         options = self.options
+        # a span of one instant is done as soon as it begins
         span = options.t_end - options.t_start
         fraction = (t - options.t_start) / span if span > 0.0 else 1.0
         left = self._seconds_left(fraction, another=another)
@@ -61,11 +62,14 @@ class Accounts:
 
     def _seconds_left(self, fraction: float, *, another: bool) -> float | None:
         """Seconds to the end of the runs that are foreseen; None before a hundredth of the first."""
+        # too early to extrapolate from, or at the end
         if not FORETOLD <= fraction < 1.0:
             return None if fraction < 1.0 else 0.0
+        # seconds grow in proportion to the part of the span that is done
         spent = time.monotonic() - self.run
         whole = spent / fraction
         left = whole - spent + (BEHIND * whole if another else 0.0)
+        # the first forecast is kept: `--timings` compares it with what came
         if self.forecast is None:
             self.forecast = time.monotonic() - self.began + left
         return left
@@ -84,6 +88,7 @@ class Accounts:
 
     def timings(self) -> dict[str, float]:
         """cpu_integrate_s, wall_integrate_s, cpu_compile_s, wall_total_s; forecast_s of a longer one."""
+        # a command began before its runs: reading and compiling count too
         began = self.options.wall_began
         total = time.monotonic() - (self.began if began is None else began)
         foretold = {} if self.forecast is None else {"forecast_s": self.forecast}

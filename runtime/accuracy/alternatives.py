@@ -40,22 +40,30 @@ def alternatives(way: Way, written: System, start: ConsistentState, options: Opt
     The explicit method on the underlying equation comes first where there is one and no law is steep: it is by far the
     cheapest on a model that is not stiff, and gives up in a few steps on one that is.
     """
+    # the other implicit method
     other = replace(way, method="bdf" if way.method == "radau" else "radau")
+    # rtol or atol given: no accuracy to choose a method by
     if own_tolerances(options):
         return way, other
+    # index 0 asked for: the explicit method, then the implicit ones
     if way.method == "dopri":
         return replace(way, reason=NOT_STIFF), replace(way, method="radau"), replace(way, method="bdf")
+    # a form asked for leaves the choice of the method alone
     if options.index != "auto":
         return replace(way, reason=f"index {way.name} was asked for"), other
+    # events that switch: the implicit methods, whose steps end at events
     if options.events and not options.events.bends:
         steep = options.events.of_laws and way.system.form.scales
         first = _rosenbrock_at_index_1(way, written, start, options) if steep else ()
         return _because("events", (*first, way, other))
+    # steep laws without such events: a diode in a filter
     if way.system.form.scales:
         return _because("steep laws", _of_steep_laws(way, other, written, start, options))
     system = written.another("0")
+    # unknowns without an explicit rate: a massless joint
     missing = rateless(system, start)
     if missing:
+        # what was built to look at index 0 is let go
         if system.unknowns > LARGE:
             system.forget()
         return _because(f"no explicit equation for {missing[0]}", (*_without_newton(way, options), way, other))
@@ -64,6 +72,7 @@ def alternatives(way: Way, written: System, start: ConsistentState, options: Opt
 
 def _without_newton(way: Way, options: Options) -> tuple[Way, ...]:
     """The method that solves a few linear systems a step and iterates for nothing, where it is the cheapest."""
+    # every quantity's accuracy counts; the finest decides
     wanted = [a for a in (options.accuracy, *(w for _, w in options.accuracy_on)) if a is not None]
     most = SMALL if way.system.form.scales else MEDIUM
     least = COARSE if way.system.unknowns <= SMALL else COARSER
@@ -83,6 +92,7 @@ def _of_steep_laws(way: Way, other: Way, written: System, start: ConsistentState
 
 def _rosenbrock_at_index_1(way: Way, written: System, start: ConsistentState, options: Options) -> tuple[Way, ...]:
     """Rosenbrock at index 1 where steep laws of index 2 do not turn."""
+    # a small system gains too little, a large one pays for the dense factors
     if way.index != 2 or not FEW < way.system.unknowns <= SMALL:
         return ()
     reduced = _without_newton(Way("rosenbrock", written.another("1"), 1, "1", reduced=True), options)
@@ -93,8 +103,10 @@ def _turns(system: System, start: ConsistentState, options: Options) -> bool:
     """Whether a steep law changes by GROWS times as much as an unknown does, in parts, where these are as large as they
     get.
     """
+    # slopes where the unknowns are at their largest
     t, y = options.t_start, magnitudes(system, options.t_start, options.t_end, start.y, start.yd)[0]
     slopes = np.abs(system.jacobian(t, y, np.zeros_like(y))[0]) * y[system.pattern.columns_of()]
+    # rows that are not steep have size zero and do not count
     sizes = system.steep_sizes(t, y)[system.pattern.row]
     with np.errstate(all="ignore"):
         return not bool((slopes[sizes != 0.0] <= GROWS * sizes[sizes != 0.0]).all())
@@ -104,6 +116,7 @@ def _radau_at_index_1(way: Way, written: System, options: Options) -> tuple[Way,
     """Radau at index 1, where constraints that diodes make and leave hold by their derivatives: of 48 runs of
     rectifiers at random that neither method met at index 2 it met 12.
     """
+    # index 1 has no derivatives of constraints to use; events change the constraints
     if way.index < 2 or way.system.unknowns > MEDIUM or options.events:
         return ()
     return (Way("radau", written.another("1"), 1, "1"),)

@@ -53,16 +53,19 @@ class Thinned:
 
     def take(self, rows: Floats) -> None:
         """Rows [k, width] in ascending time."""
+        # of two rows at one instant the first counts: before a jump
         before = -np.inf if self._last is None else self._last[0, 0]
         rows = rows[np.diff(rows[:, 0], prepend=before) > 0.0]
         if not len(rows):
             return
+        # every stride-th row counted over all batches
         first = -self.seen % self._stride
         self.seen += len(rows)
         if first < len(rows):
             self._kept.append(rows[first :: self._stride].copy())
             self._number += len(self._kept[-1])
         self._last = rows[-1:].copy()
+        # too many: every second one goes, and only every second comes from here on
         while self._number > 2 * min(max(self._most, self.seen // PART), MANY):
             self._kept = [np.concatenate(self._kept)[::2]]
             self._stride, self._number = 2 * self._stride, len(self._kept[0])
@@ -79,18 +82,23 @@ class Thinned:
 
     def rows(self, instants: Floats) -> Floats:
         """The rows at these instants, zeros of no row where they are not among its own."""
+        # rows of this run in ascending time
         found = self._all
+        # the last row at or before each instant
         place = np.searchsorted(found[:, 0], instants, side="right") - 1
         return found[place] if np.array_equal(found[place, 0], instants) else found[:0]
 
 
 def known_instants(times: Floats, options: Options, quantities: int) -> Floats | None:
     """Instants of comparison [s] where those of the trace are known before a run; None where they are its steps."""
+    # a trace of steps: which instants there are a run alone tells
     if options.every is None:
         return None
+    # a fine grid serves as it is, thinned
     if times.size >= FEW:
         most = min(GRID, max(VALUES // max(quantities, 1), FEW))
         return some(times, most)
+    # a coarse grid: instants spread by the golden ratio, which no period resonates with
     span = options.t_end - options.t_start
     spread = options.t_start + span * (np.arange(1, MOST + 1) * GOLDEN % 1.0)
     return distinct(np.concatenate([spread, times[times > options.t_start], [options.t_end]]))
@@ -104,9 +112,11 @@ def some(times: Floats, most: int) -> Floats:
 def common(stored: Floats, options: Options) -> Floats:
     """Instants of comparison [s] for a run that stored rows at these."""
     found = distinct(stored)
+    # stops (corners of sources) are no instants of comparison: two sides meet there
     stops = np.asarray([] if options.stops is None else options.stops, dtype=np.float64)
     stops = distinct(stops[np.isfinite(stops)])
     if stops.size:
+        # the nearest stop on either side
         right = np.searchsorted(stops, found)
         near = np.minimum(
             np.abs(found - stops[np.minimum(right, stops.size - 1)]), np.abs(found - stops[np.maximum(right - 1, 0)])
@@ -121,15 +131,19 @@ def late_by(instants: Floats, one: Floats, two: Floats, span: float) -> Floats:
     the other.  What the jumps do is compared behind them.  Where both have it at the same instant, as sampled actions
     are, both values there are those before it.
     """
+    # events that lie closer than round-off are one
     one, two = _group_bounds(one, span), _group_bounds(two, span)
     if not (one.size and two.size):
         return np.zeros(instants.size)
+    # pairs of events that are each other's nearest
     own = _nearest(one[:, 0], two[:, 0])
     same = _nearest(two[:, 0], one[:, 0])[own] == np.arange(len(two))
     low, high = np.minimum(one[own, 0], two[:, 0]), np.maximum(one[own, 1], two[:, 1])
+    # a pair counts where it is much closer than its neighbours are
     gap = np.diff(two[:, 0], prepend=-np.inf, append=np.inf)
     near = same & (low < high) & (high - low <= APART * np.minimum(gap[:-1], gap[1:]))
     low, high = low[near], high[near]
+    # the pair that begins last before each instant
     place = np.searchsorted(low - NEAR * span, instants, side="right")
     within = instants <= np.append(-np.inf, high + NEAR * span)[place]
     return np.where(within, np.append(0.0, high - low)[place], 0.0)
@@ -154,6 +168,7 @@ def _nearest(times: Floats, wanted: Floats) -> NDArray[np.intp]:
 
 def join_instants(instants: Floats, kinds: Ints, compared: Floats) -> tuple[Floats, Ints]:
     """Instants with their kinds, those of comparison among them."""
+    # both sets of instants in one order; kinds are bits, so that one may be both
     every = distinct(np.concatenate([instants, compared]))
     found = np.zeros(every.size, dtype=np.int32)
     found[np.searchsorted(every, instants)] = kinds
@@ -185,6 +200,7 @@ class Instants:
 
     def __init__(self, options: Options, kept: dict[str, Any], quantities: int) -> None:
         """kept: by the model; the run before had the same instants, or others; quantities: compared."""
+        # what decides the instants: with the same the last run's are used again
         asked = options.t_start, options.t_end, options.every, options.at, options.sampled_at
         before = kept.get("instants")
         if before is None or before[0] != asked:
@@ -192,6 +208,7 @@ class Instants:
             compared = known_instants(times, options, quantities)
             both = None if compared is None else _Joined.select_instants(times, kinds, compared)
             before = asked, (times, kinds, compared, both)
+            # a long list is not kept between runs
             if times.size <= KEPT:
                 kept["instants"] = before
         self.times: Floats
@@ -212,8 +229,10 @@ class Instants:
 
     def rows(self, *, compared: bool, draft: bool) -> tuple[Floats, Ints]:
         """Instants and kinds of a run's rows; compared: with those of comparison, of a draft these alone."""
+        # without comparison, or before a draft has given instants
         if not compared or self.common is None:
             return self.times, self.kinds
+        # joined anew where a run changed the instants
         if self._joined is None or self._joined.compared is not self.common:
             self._joined = _Joined.select_instants(self.times, self.kinds, self.common)
         return self._joined.draft if draft else self._joined.every

@@ -67,6 +67,7 @@ Run = Callable[[float, float], Sampled]
 
 def _achievement(estimate: float, met: bool, runs: int, tolerance: float, *, lost: bool = False) -> Achieved:
     """A finite estimate, or none at all."""
+    # two runs that cannot be compared: no estimate, never met
     if not np.isfinite(estimate):
         return Achieved(None, False, runs, tolerance, lost)
     return Achieved(estimate, met, runs, tolerance, lost)
@@ -91,13 +92,16 @@ def _is_limited(failure: SolverFailure) -> bool:
 def _draft(run: Run, tolerance: float, law: Law) -> Sampled:
     """The first run; where it fails, once more with smaller tolerances, where it is strained with a tame one."""
     tried = 0
+    # looser at first, where that fails finer: a coarse step may leave the domain of a law
     while True:
         try:
             return run(min(max(RETRIED[tried] * tolerance, law.finest) / law.ratio, law.loosest), DRAFT * LONGEST)
         except SolverFailure as failure:
             tried += 1
+            # what a limit of work or of time stopped, or stiffness, no tolerance mends
             if tried == len(RETRIED) or _is_limited(failure) or failure.cause == "stiff":
                 raise
+            # strained, or the last try: the tolerance at which runs have converged
             if failure.cause == "strained" or tried == len(RETRIED) - 1:
                 tolerance = min(tolerance, TAME * law.ratio / RETRIED[tried])
 
@@ -119,38 +123,50 @@ def control(
 
     Raises SolverFailure where the first runs fail.
     """
+    # nothing finite wanted: as for 1e-4
     wanted = float(np.min(target, initial=1.0))
     tolerance = law.tolerance(wanted if wanted < 1.0 else 1e-4) if first is None else max(first, law.finest)
     last = _draft(run, min(tolerance, TAME * law.ratio) if tame else tolerance, law)
     estimate, longest = Estimate(law, target), LONGEST
+    # a draft of hardly more steps than its longest allows: the motion asks for none
     still = last.steps <= 1.0 / (DRAFT * LONGEST) + QUIET
     shorter: float | None = None
     number, away = 1, False
+    # the draft's steps say how long the run is, and a law's power depends on that
     if first is None and wanted < 1.0:
         tolerance = law.tolerance(wanted, last.steps)
+    # a draft at its loosest may be followed by a larger drop than the usual ratio
     ratio = max(law.ratio, TENTH) if last.tolerance >= law.loosest else law.ratio
     tolerance = max(min(tolerance, ratio * last.tolerance), law.far * last.tolerance, law.finest)
     while number < RUNS:
         number += 1
         now = _finer(run, last, tolerance, longest, law, compared=bool(np.isfinite(estimate.over)))
+        # a finer run failed and was not worth another try
         if now is None:
             break
         apart = estimate.compare(last, now, shorter)
+        # the same steps and the same values: the tolerance has no effect
         if now.steps == last.steps and apart < ROUND_OFF:
             return _verdict_on_like_steps(run, now, target, number)
         away = have_diverged(last, now, target)
+        # met, and by more than one pair where one alone is not believed
         if estimate.met and not ((doubted or estimate.stalled) and estimate.alone) and not away:
             return _achievement(estimate.apart, True, number, now.tolerance)
+        # a method on trial whose next run would cost too much: left to the next method
         dear = estimate.lost or estimate.next_tolerance(now.tolerance) <= DEAR
         if law.brief and dear and now.steps < LENGTHY:
             return _achievement(estimate.apart, False, number, now.tolerance, lost=estimate.lost)
         before, still = still, is_held(now, longest)
+        # both runs held by the longest step: the tolerance says nothing, shorter steps do
         held, finest = before and still, now.tolerance <= 1.01 * law.finest
+        # the finest tolerance is reached: no finer run is left
         if finest and not held:
             last = now
             break
+        # steps are shortened where they, not the tolerance, decide the error
         shorter = estimate.shorter() if held and (finest or not estimate.root) else None
         last, longest = now, longest * (shorter or 1.0 / STRETCH)
+        # runs that ran away from each other are not followed loosely
         tolerance = min(estimate.next_tolerance(now.tolerance), TAME if away else 1.0)
     if estimate.met and not away:  # doubted, and no finer run can tell: one with other steps can
         return _verdict_on_like_steps(run, last, target, number)
@@ -169,14 +185,19 @@ def _finer(run: Run, last: Sampled, tolerance: float, longest: float, law: Law, 
             return run(tolerance, longest)
         except SolverFailure as failure:
             tried += 1
+            # a limit of work or time; or nothing to compare with after all tries
             if _is_limited(failure) or (not compared and tried == len(RETRIED)):
                 raise
+            # the first failure at an event may be chance: a little finer passes
             by_chance = tried == 1 and failure.cause in CHANCES
         if not compared:  # there is nothing to hand back yet: as coarse as will do, else a little finer
             coarse = law.ratio * last.tolerance
             tolerance = coarse if tolerance < WORTH * coarse and tried == 1 else WORTH * tolerance
             continue
+        # half way in decades of tolerance
         between = float(np.sqrt(tolerance * last.tolerance))
+        # hardly finer than the last run: not worth it
         if between > WORTH * last.tolerance and not by_chance:
             return None
+        # finer by chance, or the geometric mean
         tolerance = between if between <= WORTH * last.tolerance else WORTH * tolerance

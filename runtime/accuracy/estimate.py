@@ -85,11 +85,14 @@ def _shrink(law: Law, power: float, step: float, coarse: Sampled, fine: Sampled)
     """
     longer, jumps = fine.steps / max(coarse.steps, 1), fine.jumps
     ratio = max(10.0 ** (-power * step), law.far**law.credit)
+    # steps that hardly shorten: the tolerance did not decide them
     if longer <= ALIKE if jumps else longer < 1.0 and not law.order:
         ratio = max(ratio, UNSEEN)
+    # a method whose error follows its steps: their ratio to the power of its order
     if law.order:
         order = law.order if fine.steps >= LENGTHY else min(law.order, law.fronts)
         ratio = max(ratio, min(max(longer, 1.0) ** -order, UNSEEN))
+    # |e_fine| = r |e_coarse|, hence e_fine / difference = r / (1 - r)
     return float(law.safety * ratio / (1.0 - ratio))
 
 
@@ -97,6 +100,7 @@ def _doubt(law: Law, shrink: float, step: float, coarse: Sampled, fine: Sampled)
     """Times the estimate: what must be within what was asked, where events happen, which may hold the steps."""
     if not fine.jumps:
         return 1.0
+    # what the steps alone make believe
     ratio = min(max(fine.steps / max(coarse.steps, 1), 1.0) ** -HELD, UNSEEN)
     held = not law.order and step > APART and law.safety * ratio / (1.0 - ratio) > shrink
     return SURE if held else max(SURE / law.safety, 1.0)
@@ -104,10 +108,13 @@ def _doubt(law: Law, shrink: float, step: float, coarse: Sampled, fine: Sampled)
 
 def _unlike(law: Law, coarse: Sampled, fine: Sampled) -> bool:
     """Whether the finer run has met what the other has not seen."""
+    # the finer run has other events
     if abs(fine.jumps - coarse.jumps) > OTHERS * max(fine.jumps, coarse.jumps):
         return True
+    # of steps that say nothing: too few, or too many to be chance
     if not law.order or not SHORT <= fine.steps < LENGTHY:
         return False
+    # steps grow with the tolerance to -1/order; far more have met something
     asked: float = (coarse.tolerance / fine.tolerance) ** (1.0 / law.order)
     return fine.steps > GROWN * asked * coarse.steps
 
@@ -142,24 +149,32 @@ class Estimate:
         """Takes the pair in; returns the plain difference.  shorter: the longest step of the finer over that of the
         coarser run, where it holds both.
         """
+        # decades between the tolerances
         step = float(np.log10(coarse.tolerance / fine.tolerance))
         apart, over = difference(coarse, fine, self.target)
+        # what comes to rest at zero has an error of its own
         left, left_over = left_at_rest(coarse, fine, self.target, known=self.root)
         self.root |= left > 0.0
+        # at a root the tolerance decides, whatever the steps
         if self.root and step > 0.0:
             shorter = None
+        # the last pair stalled and this one is worse by far
         self.stalled = self._stalls and self._before is not None and over > BY_FAR * self._before[0]
         self.alone = shorter is None and (self._before is None or self.stalled)
+        # the pair has hardly a digit in common: unconverged
         lost = apart > DIFFER and over > FAR_OFF
         self._unknown = lost and (step >= DEEP or self.lost)
         self._deep = _affordable(coarse, fine) if lost and not self._unknown else 1.0
         self.lost = lost
         shrink, luck, slow, unseen, self._stalls = None, 1.0, False, False, False
+        # a short run earns less credit
         credit = self.law.credit if fine.steps >= SHORT else min(self.law.credit, self.law.short)
         credit *= ROOT if self.root else 1.0
+        # both held by the longest step: the error follows the steps
         if shorter is not None:
             part = shorter ** (BY_STEPS * (ROOT if self.root else 1.0))
             shrink = self.law.safety * part / (1.0 - part)
+        # a pair before: the observed power counts
         elif self._before is not None:
             over_before, step_before = self._before
             self._stalls = fine.jumps > 0 and over > STALLS * over_before
@@ -167,30 +182,38 @@ class Estimate:
             if over > over_before or slow:
                 # no convergence seen: no credit for the smaller tolerance; either may be the better one
                 shrink, slow, unseen = 1.0, True, True
+            # the observed power, within bounds
             elif over > 0.0 and np.isfinite(over_before):
                 power = np.log10(over_before / over) / step_before
                 self._power = float(np.clip(power, 0.3, 1.0))
                 if power > self._fastest(fine):  # by chance: the pair before speaks for the last run
                     luck = 10.0 ** ((power - credit) * step_before)
+        # no pair before, but events or steps that the coarser run has not seen
         if shrink is None and _unlike(self.law, coarse, fine):
             shrink, slow, unseen = 1.0, True, True
             self.stalled |= self.law.damps
+        # nothing observed: the law's own power
         if shrink is None:
             power = credit if self._power is None else min(self._power, credit)
             shrink = _shrink(self.law, power, step, coarse, fine)
         self._before = (over, step) if shorter is None and not lost else None  # what is lost has no power
+        # no estimate below what the method leaves at this tolerance
         least = self.law.least * fine.tolerance
         shrink *= luck
+        # the estimate shown is the safer of two; the decision takes the observed one
         told = self._error_ratio(step, coarse, fine) if shorter is None and not slow else SURE
         told = max(shrink, min(told, MET / over)) if over > 0.0 else shrink
         self.apart, self.over = max(apart * told, least), max(over * shrink, least / float(np.min(self.target)))
         self.apart, self.over = max(self.apart, left), max(self.over, left_over)
+        # what a first step passed over
         off, off_over = passed_over(coarse, fine, self.target, self.law.safety * UNSEEN / (1.0 - UNSEEN))
         self.apart, self.over = max(self.apart, off), max(self.over, off_over)
+        # what one step of the coarser run passed over
         off, off_over = before_fronts(coarse, fine, self.target)
         self.apart, self.over = max(self.apart, shrink * off), max(self.over, shrink * off_over)
         doubt = SURE if unseen else _doubt(self.law, shrink, step, coarse, fine)
         self.met = doubt * self.over <= 1.0
+        # not met: the estimate shown has the doubt in it
         if not self.met:
             self.apart *= doubt
         return apart
@@ -198,6 +221,7 @@ class Estimate:
     def _error_ratio(self, step: float, coarse: Sampled, fine: Sampled) -> float:
         """Error of the finer run over its difference from the coarser one, at most; step: decades of tolerance."""
         law = self.law
+        # errors at events fall slower
         power = min(law.sure, AT_EVENTS) if fine.jumps else law.sure
         ratio = max(10.0 ** (-power * step), law.far**power, (fine.steps / max(coarse.steps, 1)) ** -STEPPED)
         ratio = min(ratio, UNSEEN)
@@ -222,7 +246,10 @@ class Estimate:
         """
         if self._unknown:  # the coarser run says nothing of a much finer one: another beside that will
             return max(FIRST_DROP * tolerance, self.law.finest)
+        # the observed power, or the law's before one is known
         power = self.law.power if self._power is None else max(self._power, SLOWEST)
+        # error ~ tolerance^power: the drop that brings it to AIM of the target
         drop = max(AIM * self.over, TINY) ** (-1.0 / power)
+        # a first drop is bounded on both sides, a later one may be small
         least, most = (FIRST_DROP, self.law.little) if self._power is None else (1e-3, LEFT)
         return max(min(float(np.clip(drop, least, most)), self._deep) * tolerance, self.law.finest)

@@ -25,22 +25,27 @@ def passed_over(coarse: Floats, fine: Floats, places: Ints, rates: Ints) -> Floa
     """
     found = np.zeros(places.size)
     before, now = coarse[:, 0], fine[:, 0]
+    # one row has no steps
     if before.size < 2 or not now.size:
         return found
     place = np.searchsorted(before, now) - 1  # of the step in which each row lies
     inside = (place >= 0) & (now < before[np.minimum(place + 1, before.size - 1)])
     number = np.bincount(place[inside], minlength=before.size)
+    # steps of the coarser run that hold far more rows of the finer one than the mean
     crowded = number >= max(CROWD, BEYOND * now.size / before.size)
     inside &= crowded[place]
     if not inside.any():
         return found
     k, values = place[inside], fine[inside][:, places]
+    # dense output of the coarser run: a cubic by values and rates at both ends
     length = (before[k + 1] - before[k])[:, None]
     at = (now[inside] - before[k])[:, None] / length
     one, two = coarse[k][:, places], coarse[k + 1][:, places]
+    # a rate far above the secant belongs to what relaxes at once: clipped
     most = STEEP * np.abs(two - one)
     slope_one, slope_two = (np.clip(length * coarse[j][:, rates], -most, most) for j in (k, k + 1))
     back = 1.0 - at
     cubic = back**2 * ((1.0 + 2.0 * at) * one + at * slope_one) + at**2 * ((1.0 + 2.0 * back) * two - back * slope_two)
+    # what the rows of the finer run are off that cubic
     apart: Floats = np.abs(values - cubic).max(axis=0)
     return np.where(np.isfinite(apart), apart, 0.0)

@@ -127,9 +127,12 @@ to 100 times the tolerance)."""
 
 def law_of(method: str, *, steep: bool, smooth: bool = False, reduced: bool = False) -> Law:
     """What follows from the tolerance of a method on a model."""
+    # radau with all its stages along a smooth motion
     if smooth and method == "radau":
         return LONG_MOTION
+    # rosenbrock at index 1, whose constraints hold by derivatives
     if reduced and method == "rosenbrock":
         return REDUCED
+    # laws measured on models with diodes and the like
     of_steep = {"bdf": STEEP, "radau": OF_THREE_STAGES, "rosenbrock": ON_FRONTS, "dopri": UNSEEN_CORNERS}
     return of_steep.get(method, LAWS[method]) if steep else LAWS[method]

@@ -40,22 +40,29 @@ def nominals_of_unknowns(system: System, point: tuple[float, Floats, Floats], pe
     rows, columns = system.pattern.row, system.pattern.columns_of()
     jy, jyd = system.jacobian(*point)
     with np.errstate(all="ignore"):
+        # a rate counts by what it moves the unknown within a step
         entry = np.abs(jy) + np.abs(jyd) / step
     if not np.isfinite(entry).all():
         return peaks.copy()
+    # each unknown has a row that determines it: of f = p/m that is f
     row_of = _pair(system, entry)
     nominal, paired = peaks.copy(), row_of >= 0
+    # entries of that row which read the other unknowns
     own = rows == row_of[columns]  # the entry at which an unknown meets its row
     pivot = np.zeros(system.unknowns)
+    # the entry by which the row is solved for its unknown
     pivot[columns[own]] = entry[own]
     zero = _zero(system, point[0], np.abs(jy), entry, row_of)[columns] & (entry > 0.0)
+    # nominal values pass from row to row, HOPS of them at most
     for _ in range(HOPS):
         terms = np.zeros(system.rows)
         with np.errstate(over="ignore"):
             term = entry * nominal[columns]
+            # the largest other term of each row, and what it makes of the row's unknown
             np.maximum.at(terms, rows[~own], term[~own])
             made = np.divide(terms[row_of], pivot, out=np.zeros(system.unknowns), where=paired & (pivot > 0.0))
             np.maximum.at(terms, rows, term)
+            # a zero by balance: it counts by the terms of the rows that read it
             np.maximum.at(made, columns[zero], (terms[rows] / np.where(zero, entry, 1.0))[zero])
         np.fmax(nominal, np.where(np.isfinite(made), made, 0.0), out=nominal)
     return np.fmax(nominal, _of_its_like(system, entry > 0.0, row_of, nominal))
@@ -66,17 +73,22 @@ def _of_its_like(system: System, there: NDArray[np.bool_], row_of: Ints, nominal
     from scipy.sparse import coo_matrix  # 60 ms, which few runs need
     from scipy.sparse.csgraph import connected_components
 
+    # which row determines which unknown, turned around
     rows, columns = system.pattern.row, system.pattern.columns_of()
     of_row = np.full(system.rows, -1, dtype=np.int32)
     of_row[row_of[row_of >= 0]] = np.flatnonzero(row_of >= 0)
     joins = there & (of_row[rows] >= 0)
+    # a graph: from what a row reads to what it determines
     to, since = of_row[rows[joins]], columns[joins]
     graph = coo_matrix((np.ones(to.size), (since, to)), shape=(system.unknowns,) * 2)
+    # unknowns that determine each other share what is largest among them
     count, part = connected_components(graph, connection="strong")
     kind = alike(system)
     largest = np.zeros((count, int(kind.max(initial=0)) + 1))
     np.maximum.at(largest, (part, kind), nominal)
+    # edges between these parts, each once
     between = np.unique(np.stack([part[since], part[to]])[:, part[since] != part[to]], axis=1)
+    # the largest passes along the edges until nothing grows
     while between.size:
         before = largest.copy()
         np.maximum.at(largest, between[1], before[between[0]])
@@ -92,14 +104,17 @@ def _zero(system: System, t: float, algebraic: Floats, entry: Floats, row_of: In
     """
     rows, columns = system.pattern.row, system.pattern.columns_of()
     nothing = np.zeros(system.unknowns)
+    # a homogeneous row: zero where all unknowns are
     with np.errstate(all="ignore"):
         homogeneous = system.residual(t, nothing, nothing) == 0.0
     own = rows == row_of[columns]
     reads = np.zeros(system.unknowns, bool)
+    # its own unknown enters by value, not by rate alone
     reads[columns[own]] = (algebraic[own] > 0.0) & homogeneous[rows[own]]
     there = (entry > 0.0) & ~own
     zero = np.zeros(system.unknowns, bool)
     while True:
+        # rows whose other unknowns are all zero add theirs; until none is added
         others = np.bincount(rows[there & ~zero[columns]], minlength=system.rows)
         more = reads & ~zero & (others[row_of] == 0)
         if not more.any():
@@ -113,12 +128,14 @@ def _pair(system: System, entry: Floats) -> Ints:
     """
     pattern = system.pattern
     rows, columns = pattern.row, pattern.columns_of()
+    # equilibrated, so that units do not decide what is large
     row, column = sparse_factors(rows, columns, entry, (system.rows, system.unknowns))
     scaled = entry * row[rows] * column[columns]
     largest = np.zeros(system.unknowns)
     np.maximum.at(largest, columns, scaled)
     large = (scaled >= PIVOT * largest[columns]) & (scaled > 0.0)
     begin = np.concatenate([[0], np.cumsum(np.bincount(columns[large], minlength=system.unknowns))]).astype(np.int32)
+    # first along large entries, then along any
     first = match_rows(Pattern(system.rows, system.unknowns, begin, np.ascontiguousarray(rows[large], dtype=np.int32)))
     return match_rows(pattern, first)
 
@@ -132,6 +149,7 @@ def nominals_of_quantities(system: System, point: tuple[float, Floats, Floats], 
     with np.errstate(all="ignore"):
         here = system.observe(t, y[:n], yd[:n])
         found = np.zeros(here.size)
+        # random signs: sums of many terms do not cancel by chance
         for k in range(TRIES):
             signs = np.where(uniform(n, 0, k * n) < 0.5, -1.0, 1.0)
             by = STEP * signs * nominal[:n]

@@ -94,31 +94,41 @@ def above_highest(index: int) -> str:
 def choose_index(wanted: str, facts: Structure, method: str = "auto") -> tuple[str, int, tuple[str, ...]]:
     """Form of the runtime, its index, warnings.  Raises NoSuchForm for a method that cannot integrate the form."""
     written = facts.index
+    # explicit methods integrate the underlying equation
     if wanted == "auto" and method in ON_UNDERLYING:
         wanted = "0"
     if method in ON_UNDERLYING and wanted != "0":
         raise NoSuchForm(
             f"method {method} integrates the underlying equation, index 0, and index {wanted} was asked for"
         )
+    # index 0: an explicit equation for the rates
     if wanted == "0":
         return "0", 1, ()
+    # higher indices have no form here
     if written is not None and written > HIGHEST:
         raise NoSuchForm(above_highest(written))
+    # rosenbrock solves each step's linear systems of index 1 at most
     if method in OF_INDEX_ONE:
         if wanted not in ("auto", "1") and (written is None or written > 1):
             raise NoSuchForm(f"method {method} integrates equations of index 1, and index {wanted} was asked for")
         return ("3", written, ()) if written is not None and written <= 1 else ("1", 1, ())
+    # nothing known of the index: as written
     if written is None:
         return "3", 2, ("the model's index could not be determined: integrated as written",)
+    # index 3 is stabilised to 2 (Gear, Gupta, Leimkuhler), others stay as written
     if wanted == "auto":
         return ("2", 2, ()) if written == 3 else ("3", written, ())
+    # constraints of positions as they are
     if wanted == "3":
         note = ("index 3 integrated directly: about 100 times less accurate than the stabilised form",)
         return "3", written, note if written >= 3 else ()
+    # stabilised: positions and velocities
     if wanted == "2":
         return ("2", 2, ()) if written >= 3 else ("3", written, ())
+    # constraints by velocities
     if wanted == "2v":
         return "2v", min(written, 2), ()
+    # constraints by accelerations
     if wanted == "1":
         return "1", min(written, 1), ()
     raise WrongOption(f"index {wanted}: auto, 3, 2, 2v, 1 or 0")
@@ -139,9 +149,11 @@ def choose_method(options: Options) -> str:
     """
     if options.method == "auto" and options.index == "0":
         return "dopri"
+    # own tolerances: bdf, whose error test they are made for
     if options.method == "auto":
         own = options.rtol is not None or options.atol is not None
         return "bdf" if own else "radau"
+    # a method named by the user
     if options.method in METHODS:
         return options.method
     raise WrongOption(f"method {options.method}: auto, {', '.join(METHODS[:-1])} or {METHODS[-1]}")
@@ -154,8 +166,10 @@ def instants(options: Options) -> tuple[Floats, Ints]:
     outside = [t for t in options.at if not t0 - beyond <= t <= t1 + beyond]
     if outside:
         raise WrongOption(f"instant {outside[0]:g} s lies outside {t0:g} .. {t1:g} s")
+    # instants that rounding put outside are moved to the ends
     wanted = np.clip(np.asarray(options.at, dtype=np.float64), t0, t1)
     if options.every is not None:
+        # 1 s by 0.1 s is ten steps, though 10 * 0.1 rounds
         number = int(np.floor((t1 - t0) / options.every * (1.0 + 1e-12)))
         grid = np.minimum(t0 + options.every * np.arange(number + 1), t1)
         if t1 - grid[-1] < 1e-9 * options.every:
@@ -165,6 +179,7 @@ def instants(options: Options) -> tuple[Floats, Ints]:
     wanted = distinct(np.concatenate([wanted, [t0, t1]]))
     if not options.sampled_at:
         return wanted, np.full(wanted.size, TRACE, dtype=np.int32)
+    # samples of `every` are rows too, not shown in the trace
     sampled = np.asarray(options.sampled_at, dtype=np.float64)
     every = distinct(np.concatenate([wanted, sampled]))
     return every, (TRACE * np.isin(every, wanted) + STEP * np.isin(every, sampled)).astype(np.int32)

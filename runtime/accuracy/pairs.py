@@ -85,8 +85,10 @@ def distance_of_runs(coarse: Sampled, fine: Sampled) -> Floats:
     far it moves meanwhile, and all that is more than the jump.
     """
     values, late = coarse.own
+    # rates that are no numbers give no time tolerance
     late = np.minimum(np.fmax(np.fmax(late, fine.late), 0.0), LARGEST)  # no number: no time tolerance
     over = np.fmax(_outside(values, fine.values, late), _outside(fine.values, values, late))
+    # 0 times a value that is no number is none: it remains one
     over = np.fmax(over, 0.0 * fine.values * values)
     return over if fine.between is None else np.fmax(np.minimum(over, fine.between), over - fine.jump)
 
@@ -96,10 +98,12 @@ def _outside(values: Floats, others: Floats, late: Floats) -> Floats:
     farther than `late` from what they are.
     """
     low, high = others.copy(), others.copy()
+    # the band of the values at neighbouring instants
     for k in range(1, min(ABOUT, len(others) - 1) + 1):
         for found, least in ((low, np.fmin), (high, np.fmax)):
             found[k:] = least(found[k:], others[:-k])
             found[:-k] = least(found[:-k], others[k:])
+    # outside that band, widened by the time tolerance
     return np.fmax(np.fmax(low, others - late) - values, values - np.fmin(high, others + late))
 
 
@@ -108,9 +112,11 @@ def lateness(time: Floats, values: Floats, rates: Floats, tolerance: float) -> F
     than BEND times what the steps beside them show; a motion that relaxes at once makes of any error a rate without
     bound.
     """
+    # one row: its rate alone
     if len(time) < 2:
         return tolerance * np.abs(rates)
     with np.errstate(all="ignore"):
+        # secants on both sides of a row, of which the flatter counts
         slopes = np.abs(np.diff(values, axis=0) / np.diff(time)[:, None])
     slopes = np.vstack([slopes[:1], np.fmin(slopes[:-1], slopes[1:]), slopes[-1:]])
     return tolerance * np.fmin(np.abs(rates), BEND * slopes)
@@ -122,11 +128,14 @@ def zero(coarse: Sampled, fine: Sampled, target: Floats) -> NDArray[np.bool_]:
     Beside others of their unit they are seen at once, also where they fall with the tolerance: then they are errors of
     what cancels.  Where two runs miss the target the equations are asked.
     """
+    # the largest value that either run has seen
     before, now = (np.abs(values).max(axis=0) for values in (coarse.own[0], fine.values))
     seen = np.maximum(before, now)
     found = np.isfinite(seen)  # an infinite value is no zero beside an infinite noise
+    # noise of a run that ran away is not believed
     noise = np.minimum(fine.noise, RUNAWAY * np.asarray(coarse.noise))
     found &= (seen <= noise) | ((now <= FALLS * before) & (now <= FAINT * noise))
+    # the equations are asked, once, where what is left would decide
     if fine.left_open is not None:
         with np.errstate(invalid="ignore"):  # values that are no numbers
             far = distance_of_runs(coarse, fine).max(axis=0)
@@ -143,18 +152,23 @@ def _has_size(coarse: Sampled, fine: Sampled, target: Floats) -> NDArray[np.bool
 
 def difference(coarse: Sampled, fine: Sampled, target: Floats) -> tuple[float, float]:
     """(largest relative difference, the same over the accuracy wanted) of two runs, in the finer one's sizes."""
+    # quantities of size zero, or of which nothing is asked, do not count
     size = fine.largest
     use = (size != 0.0) & np.isfinite(target)  # sizes that are no numbers are used: they are not met
+    # nothing to compare
     if not use.any() or not fine.values.size:
         return 0.0, 0.0
     before = coarse.own[0]
+    # rows at other instants: the runs have nothing in common
     if before.shape != fine.values.shape:
         return np.inf, np.inf
+    # zeros by symmetry are no errors
     use &= ~zero(coarse, fine, target)
     if not use.any():
         return 0.0, 0.0
     seen = np.maximum(np.abs(before), np.abs(fine.values)).max(axis=0)[use]
     with np.errstate(all="ignore"):
+        # sizes that differ by far: the runs saw different motions
         unlike = (size[use] > UNSEEN * seen) & (np.abs(size - coarse.largest)[use] > ALIKE * size[use])
         relative = distance_of_runs(coarse, fine)[:, use].max(axis=0, initial=0.0) / size[use]
     relative = np.where(np.isfinite(relative) & ~unlike, relative, np.inf)
@@ -165,6 +179,7 @@ def before_fronts(coarse: Sampled, fine: Sampled, target: Floats) -> tuple[float
     """How far two runs are apart, relative, and that over the accuracy wanted, where the coarser one passes over a
     front in one step.
     """
+    # no front
     if fine.front is None or not fine.front.any():
         return 0.0, 0.0
     use = _has_size(coarse, fine, target)
@@ -178,14 +193,17 @@ def passed_over(coarse: Sampled, fine: Sampled, target: Floats, credit: float) -
     with the time since then, and with what their steps differ by.  The error is credit times what that makes of a whole
     step, but no more than the equations and the dense output are from each other since its begin.
     """
+    # no step passes over anything, or rows that are elsewhere
     if fine.passed is None or not fine.passed.any() or coarse.own[0].shape != fine.values.shape:
         return 0.0, 0.0
     at = fine.passed[:, 0] > 0.0
     use = _has_size(coarse, fine, target)
     if not use.any():
         return 0.0, 0.0
+    # length of the step over what relaxes, and the bound by the dense output
     longer, most = fine.passed[at].T
     before = coarse.passed
+    # how far the coarser run's step was
     beside = before[at, 0] if before is not None and len(before) == len(at) else np.zeros(longer.size)
     with np.errstate(all="ignore"):  # steps of one length, of a run that does not pass over it: 0, infinite
         longer = longer / np.fmin(np.abs(1.0 - longer / beside), 1.0)
@@ -203,19 +221,25 @@ def left_at_rest(coarse: Sampled, fine: Sampled, target: Floats, *, known: bool 
     zero, and what they hardly share a digit of is left.
     """
     before, size = coarse.own[0], fine.largest
+    # other instants, or jumps
     if before.shape != fine.values.shape or len(before) < 2 or fine.jumps:
         return 0.0, 0.0  # what jumps may be nothing between its jumps
     use = _has_size(coarse, fine, target)  # round-off has not come to rest
     if not use.any():
         return 0.0, 0.0
     with np.errstate(all="ignore"):
+        # over what was asked
         far = distance_of_runs(coarse, fine)[:, use]
         over = far / (size * target)[use]
+    # runs that agree, or are no numbers
     if not np.isfinite(over).all() or not over.any():
         return 0.0, 0.0
+    # where the two are farthest apart
     row, column = np.unravel_index(np.argmax(over), over.shape)
+    # what is left of both from there to the end
     left, seen = (np.abs(values[row:, use][:, column]).max() for values in (fine.values, before))
     still = (1.0 / LOST if known else STILL) * far[row, column]
+    # not at rest: more than a trace is left of it
     if not (max(left, seen) <= still and max(left, seen, STILL * far[row, column]) < MUCH * size[use][column]):
         return 0.0, 0.0
     return float(left / size[use][column]), float(left / (size * target)[use][column])
@@ -227,11 +251,14 @@ def have_diverged(coarse: Sampled, fine: Sampled, target: Floats) -> bool:
     front that begins at next to nothing looks alike, and nothing runs away.
     """
     before, values = coarse.own[0], fine.values
+    # at fine tolerances, or without common rows, nothing is said
     if fine.tolerance <= LOOSE or before.shape != values.shape or len(values) < 2:
         return False
     with np.errstate(all="ignore"):
+        # all that it was so far, against how far the runs are apart
         most = np.maximum.accumulate(np.abs(values), axis=0)[:-1]
         now = np.maximum(np.abs(values), np.abs(before))[1:]
         away = distance_of_runs(coarse, fine)[1:] > np.maximum(PARTED * most, MUCH * now)
+    # what begins at round-off is no motion that ran away
     away &= np.abs(values[0]) > fine.noise
     return bool(away.any()) and bool((away & ~zero(coarse, fine, target)).any())

@@ -39,6 +39,7 @@ class Quantities:
         self.places: Ints = np.array([column.place for column in columns], dtype=np.int64)
         self.names = tuple(column.name for column in columns)
         traced = set(self.names)
+        # meters (ledgers) that are compared although no column holds them
         self.meters = tuple(name for name, _ in options.accuracy_on if name in METERS and name not in traced)
         self.compared = (*self.names, *self.meters)
         ranged = [k for k, name in enumerate(self.names) if name in options.to_range]
@@ -58,12 +59,15 @@ class Quantities:
 
     def largest_of_unit(self, largest: Floats, magnitude: Floats) -> Floats:
         """The largest of the unit of each stored quantity [columns], unknowns among them."""
+        # of the same run as the last time
         last = self._beside
         if last is not None and last[0] is largest and last[1] is magnitude:
             return last[2]
         of_kinds, of_columns, number = self.system.once("units", self._units)
+        # numbers without unit count by at least PURE
         found = np.zeros(number)
         found[0] = PURE
+        # unknowns and stored quantities of one unit share the largest
         np.fmax.at(found, of_kinds[: magnitude.size], magnitude[: of_kinds.size])
         np.fmax.at(found, of_columns, largest[self.places])
         self._beside = largest, magnitude, np.asarray(found[of_columns])
@@ -97,6 +101,7 @@ class Quantities:
     def accuracy_asked(self, options: Options) -> Floats:
         """Accuracy wanted of each compared quantity [compared]; infinite where none is."""
         names = list(self.compared)
+        # the accuracy of all, then those asked of single quantities
         target = np.full(len(names), np.inf if options.accuracy is None else options.accuracy)
         for name, wanted in options.accuracy_on:
             if name not in names:

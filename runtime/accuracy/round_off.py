@@ -41,10 +41,13 @@ def blur(system: System, point: Point, places: Ints, enough: Floats) -> Floats:
     with np.errstate(all="ignore"):
         here = system.observe(t, y, yd)[places]
         for k in range(TRIES):
+            # relative perturbations of random signs: what the doubles leave open
             signs = np.where(uniform(y.size, 0, k * y.size) < 0.5, -1.0, 1.0)
             beside = [(y * (1.0 + h * signs), yd * (1.0 + h * signs), h) for h in STEPS]
+            # of two step lengths the smaller effect: the larger one may be curvature
             moved = [np.abs(system.observe(t, a, b)[places] - here) / h for a, b, h in beside]
             found = np.maximum(found, ROUNDED * np.min(moved, axis=0))
+            # far below what matters: no further try
             if not (found > FAR * enough).any():
                 break
     return np.where(np.isnan(found), 0.0, found)
@@ -56,12 +59,14 @@ def worst_blur(runs: Runs, t: float, asked: Floats) -> tuple[Estimate, ...]:
     """
     assert runs.done is not None
     (finished, _, writer), told, system = runs.done, runs.quantities, runs.system
+    # nothing stored, or a large model, whose evaluations cost too much
     if not told.names or finished.last is None or system.unknowns > LARGE:
         return ()
     y, yd = (x[: system.form.written] for x in finished.last[0]())
     seen = writer.seen()
     size = np.maximum(told.largest_of_unit(finished.largest, finished.magnitude), [seen[name] for name in told.names])
     steps = np.ones(size.size)
+    # differences of large numbers: their size is their range
     if told.to_range.size:
         # round-off of x adds up like a random walk in a small difference x - 1e8 m, from step to step
         steps[told.to_range] = np.sqrt(finished.statistics.steps)
@@ -71,6 +76,7 @@ def worst_blur(runs: Runs, t: float, asked: Floats) -> tuple[Estimate, ...]:
         left = steps * blur(system, (t, y, yd), told.places, wanted)
     except SolverFailure:  # beside the point a function is none
         return ()
+    # what is left open over what was asked
     over = np.divide(left, wanted, out=np.zeros(size.size), where=wanted > 0.0)
     worst = int(np.argmax(over))
     if not over[worst] > 1.0:

@@ -86,6 +86,7 @@ class Runs:
     def derive(self, known: NDArray[np.bool_]) -> None:
         """Of the derivatives of stored quantities only the known ones [observed] are stored."""
         if not known.all():
+            # columns without known derivatives lose these
             self.columns = tuple(
                 replace(column, derivative=False) if column.derivative and not known[column.place] else column
                 for column in self.columns
@@ -93,14 +94,17 @@ class Runs:
 
     def take(self, way: Way, patience: int | None = None) -> None:
         """Goes on with another method and form; patience: steps of a run with it."""
+        # the first way has none before it
         before = getattr(self, "way", way)
         self.way, self.system, self.method, self.index = way, way.system, way.method, way.index
         self.quantities = Quantities(self.system, self.columns, self.options)
         self.patience: int | None = patience
         self.patience_with_draft: int | None = None
         self.opening = 0.0
+        # another form has other unknowns: the ceilings of its steps are unknown
         if before.system is not way.system:
             self.ceiling = None
+        # the start as seen by another form is found anew
         if before is way or (before.system, before.index) != (way.system, way.index):
             self._origin: Origin | None = None
 
@@ -109,13 +113,16 @@ class Runs:
         """The start as the system sees it, for all runs.  Where events leave numbers behind each run has its own, as of
         a large model, which lets it go.
         """
+        # events write into it, and a large one is let go between runs
         if self._origin is None and not self.options.events and self.system.unknowns <= LARGE:
             self._origin = Origin(self.system, self.start, self.index)
         return self._origin
 
     def request(self, rtol: float, atol: float | None, longest: float = LONGEST) -> Request:
         """One integration's request; longest: step, as part of the span."""
+        # the first controlled run is the draft
         options, draft = self.options, self.controlled and self.done is None
+        # a method of `auto` is tried and may be left to the next
         tried = options.method == "auto" and not self.way.lasting
         instants, kinds = self.instants.rows(compared=self.controlled, draft=draft)
         return Request(
@@ -156,15 +163,19 @@ class Runs:
         """Steps of the windows in which a run is not to be strained: of a draft, which a smaller tolerance may tame; of
         steep laws, of which Newton fails at any tolerance, of a method that another one follows.
         """
+        # steep laws: the bdf on trial alone is watched
         if self.system.form.scales:
             return LONGER if self.method == "bdf" and self.patience is not None and not draft else 0
+        # others: the draft alone, where it is loose
         return BRIEFLY if draft and rtol > 1.01 * TAME else 0
 
     @property
     def _stages(self) -> tuple[int, int] | None:
         """Of radau, in the first step and at most; None: chosen.  The order of s stages is 2 s - 1."""
+        # an order that the user asked for fixes the stages
         if self.method == "radau" and self.options.order is not None:
             return (self.options.order + 1) // 2, (self.options.order + 1) // 2
+        # along a smooth motion from three stages up
         return (3, lib.STAGES) if self.way.smooth else None
 
     @property
@@ -174,6 +185,7 @@ class Runs:
         return min((n for n in (self.options.max_steps, self.patience, drafted) if n is not None), default=None)
 
     def _write(self, rows: Floats) -> None:
+        """Rows of a run to where they belong: the comparison, the trace's file, the samples of requirements."""
         kind = rows[:, 1].astype(np.int32)
         traced = rows[(kind & TRACE) > 0]
         self.compared.take(rows, kind)
@@ -181,8 +193,10 @@ class Runs:
         self.writer.append(traced)
         if self.done is not None:
             self.done[2].append(traced[:0])  # what it still has in memory comes to its file in time
+        # samples of `every` and rows of the trace
         taken = rows[(kind & (TRACE | STEP)) > 0]
         if taken.size:
+            # requirements want a part of these; the last one is always kept
             kept = (
                 taken[self.watched(taken[:, 0], self._observe_columns(taken))]
                 if self.watched is not None
@@ -210,16 +224,19 @@ class Runs:
 
     def run(self, rtol: float, atol: float | None, longest: float = LONGEST) -> Finished:
         """One integration into a file; SolverFailure, KeyboardInterrupt leave what was computed."""
+        # the first run's rows stay, whatever happens to it
         first = self.done is None
         self.samples = []
         self.watched = self.options.watch(self.names) if self.options.watch is not None else None
         self.writer = self.keeping.writer(self.layout(rtol, atol), first)
         integration = Integration(self.system, self.start, self.request(rtol, atol, longest), self.origin)
         try:
+            # also an interrupt of the user leaves rows
             finished = self._integrate(integration)
         except BaseException:
             self._leave(integration, first)
             raise
+        # a finished run replaces the one before
         if self.done is not None:
             self.writer.flush()
             self.keeping.take(self.writer, self.done[2])
@@ -234,8 +251,10 @@ class Runs:
         try:
             return integration.run(self._write, self._progress)
         except SolverFailure as failure:
+            # the user's wall time ended it, whatever the solver says
             left = self.accounts.wall_left()
             failure.late = left is not None and left <= 0.0
+            # the patience is ours, `max_steps` the user's
             own = failure.cause == "max_steps" and self.most_steps != self.options.max_steps
             if failure.late and (own or failure.cause in ("strained", "stiff")):  # it asks for another run
                 over = SolverFailure("max_wall", failure.time, failure.step)
@@ -249,12 +268,14 @@ class Runs:
         """After a failure: the rows so far stay if there is no finished run to keep."""
         assert self.writer is not None
         integration.method.rest()
+        # no run before: the rows so far are the trace, marked as not final
         if first:
             magnitude = group_maxima(self.system, integration.sizes.magnitude)
             nominal = self.quantities.nominal(integration.driver.largest(), magnitude)
             attributes: dict[str, str | float | int] = {**self.accounts.attributes(None), "met": 0, "judged": ""}
             self.writer.finish(nominal, attributes, final=False, events=integration.past_events())
             return
+        # a run before stands: this one's rows go
         self.keeping.drop(self.writer)
 
     @property
@@ -266,6 +287,7 @@ class Runs:
     def run_sampled(self, tolerance: float, longest: float) -> Sampled:
         """One run of the accuracy control; longest: step, as part of the span."""
         self.controlled = True
+        # more steps than the patience allows are foreseen: not begun
         if self._hopeless(tolerance):
             raise SolverFailure("max_steps", self.options.t_start, 0.0, smooth=True)
         return self.compared.sample_run(tolerance, self.run(tolerance, None, longest), self.quantities)
@@ -275,6 +297,7 @@ class Runs:
         1 / (order + 1) of the tolerance at least.
         """
         samplings = self.compared.samplings
+        # nothing to foresee by: no patience, a motion that is not smooth, no run before
         if self.patience is None or self.patience != self.most_steps or not self.accounts.smooth or not samplings:
             return False
         last = samplings[-1]
@@ -283,6 +306,7 @@ class Runs:
 
     def nominal(self, finished: Finished) -> dict[str, float]:
         """Nominal value of each stored quantity: what errors of the run that stands were relative to."""
+        # the run that stands was compared: its sizes
         sampled = self.compared.samplings
         if sampled and finished is self.compared.finished:
             return self.quantities.by_name(sampled[-1].largest[: self.quantities.places.size])
@@ -296,6 +320,7 @@ class Runs:
 
     def collect_samples(self) -> Samples:
         """Samples of the run that stands in the trace."""
+        # before any run is done, its samples so far
         parts = self.samples if self.done is None else self.done[1]
         rows = np.concatenate(parts) if parts else np.zeros((0, lib.ROW_HEAD + 2 * len(self.names)))
         largest = np.zeros(len(self.names)) if self.done is None else self.done[0].largest

@@ -27,26 +27,32 @@ def confirm(runs: Runs, achieved: Achieved, target: Floats) -> Achieved:
     """
     import tempfile
 
+    # the other implicit method, at tolerances of its own
     way: Way = replace(runs.way, method=OTHER[runs.method])
     law, wanted = way.law, float(np.min(target, initial=1.0))
     tolerance = max(law.ratio * law.tolerance(wanted if wanted < 1.0 else 1e-4), law.finest)
     with tempfile.TemporaryDirectory(prefix="sysdyn-") as folder:
+        # its trace goes to a folder that vanishes
         options = replace(runs.options, output=Path(folder) / "second.h5", watch=None)
         second = Runs(runs.start, options, way)
+        # the same columns, instants and state at the start
         second.columns, second.begin = runs.columns, runs.begin
         second.instants.close(runs.instants.common)
         second.compared.jumps = runs.compared.jumps
         try:
             apart, over = difference(runs.compared.samplings[-1], second.run_sampled(tolerance, LONGEST), target)
+        # the user's limit of time is not the second run's failure
         except SolverFailure as failure:
             if failure.cause == "max_wall":
                 raise
             return replace(achieved, error_estimate=None, met=False)
+        # its work counts in both cases
         finally:
             runs.accounts.take(second.accounts)
             if second.writer is not None:
                 second.writer.discard()
     estimate = max(achieved.error_estimate or 0.0, apart)
+    # two runs without a common digit
     if not np.isfinite(estimate):
         return replace(achieved, error_estimate=None, met=False)
     return replace(achieved, error_estimate=estimate, met=achieved.met and over <= 1.0, runs=achieved.runs + 1)

@@ -22,10 +22,12 @@ class Arrays:
         events: Sequence[TraceEvent] = (),
         time_unit: str = "s",
     ) -> None:
+        # lists are taken as well as arrays
         self.time = np.asarray(time, dtype=np.float64)
         self.time_unit = time_unit
         self.values = {name: np.asarray(v, dtype=np.float64) for name, v in values.items()}
         self.rates = {name: np.asarray(v, dtype=np.float64) for name, v in (rates or {}).items()}
+        # without a description: a number whose size is that of its values
         known = {a.name: a for a in about}
         self.quantities = {name: known.get(name, About(name, "1", None)) for name in self.values}
         self.events = tuple(events)

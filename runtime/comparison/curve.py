@@ -34,17 +34,21 @@ def cells_at(time: Floats, instants: Floats) -> Ints:
 
 def bernstein(curve: Curve, cell: Ints, left: Floats, right: Floats) -> Floats:
     """Coefficients [4, m] of the curve on parts [left, right] of its cells [m]; NaN where a row is not finite."""
+    # ends of the cells
     t0, y0, y1 = curve.time[cell], curve.values[cell], curve.values[cell + 1]
     h = curve.time[cell + 1] - t0
     with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
         secant = (y1 - y0) / h
+        # without rates: lines
         if curve.rates is None:
             m0 = m1 = secant
         else:
+            # a cubic by values and rates; a line where a rate is missing
             m0, m1 = curve.rates[cell], curve.rates[cell + 1]
             line = ~(np.isfinite(m0) & np.isfinite(m1))
             if line.any():
                 m0, m1 = np.where(line, secant, m0), np.where(line, secant, m1)
+        # Bernstein coefficients from values and slopes at both ends of the part
         third = (right - left) / 3.0
         ya, ma = hermite((left - t0) / h, h, y0, y1, m0, m1)
         yb, mb = hermite((right - t0) / h, h, y0, y1, m0, m1)
@@ -53,10 +57,12 @@ def bernstein(curve: Curve, cell: Ints, left: Floats, right: Floats) -> Floats:
 
 def whole_cells(curve: Curve, cell: Ints) -> Floats:
     """Coefficients [4, m] of whole cells: `bernstein` without its evaluation, bit for bit the rows' own values."""
+    # ends of the cells, and a third of their widths times the slopes
     y0, y1 = curve.values[cell], curve.values[cell + 1]
     h = curve.time[cell + 1] - curve.time[cell]
     with np.errstate(invalid="ignore", over="ignore"):
         third = (y1 - y0) / 3.0
+        # without rates: lines
         if curve.rates is None:
             return np.stack([y0, y0 + third, y1 - third, y1])
         a, b = curve.rates[cell] * (h / 3.0), curve.rates[cell + 1] * (h / 3.0)
@@ -101,6 +107,7 @@ def largest(b: Floats) -> Floats:
 def largest_magnitude(b: Floats) -> tuple[Floats, Floats]:
     """(largest absolute value [m], its place x in 0..1 [m])."""
     inner = turning_points(b)
+    # candidates: both ends and the turning points inside
     x = np.stack([np.zeros(b.shape[1]), np.ones(b.shape[1]), inner[0], inner[1]])
     size = np.abs(np.stack([b[0], b[3], *value_at(b, inner)]))
     at = np.argmax(np.where(np.isnan(size), -1.0, size), axis=0)
@@ -109,10 +116,12 @@ def largest_magnitude(b: Floats) -> tuple[Floats, Floats]:
 
 
 def with_extrema(curve: Curve) -> Curve:
-    """The same curve with a row at each of its extrema: monotone in every cell."""
+    """The curve with a row more at each of its extrema: monotone in every cell."""
+    # cells of no width (jumps) have no inside
     cell = np.flatnonzero(np.diff(curve.time) > 0.0)
     b = whole_cells(curve, cell)
     x = turning_points(b)
+    # the turning points that exist, as rows in time
     where, found = np.nonzero(np.isfinite(x))
     at = x[where, found]
     start = curve.time[cell[found]]

@@ -71,20 +71,25 @@ def compare_quantities(
     """All pairs, blocks outside, quantities inside.  time_scale: of the test's time."""
     states = [_state(ref, pair, tolerance, times[0].size) for pair in pairs]
     tau = tolerance.tau or 0.0
+    # blocks outside: rows of one stretch are read once for each quantity
     for block in _blocks(*times):
         rows = tuple(_rows(time, block, tau) for time in times)
+        # the cell of each trace at every part of the block
         inner = tuple(cells_at(t[a:b], block.left) for t, (a, b) in zip(times, rows, strict=True))
         cells = (inner[0], inner[1])
         for state in states:
+            # without a nominal value there is no limit to compare with
             if state.status == "nominal":
                 continue
             curves = _curves(ref, test, times, rows, state.pair, time_scale)
+            # rows at the ends belong to no cell on one side
             if block.last or block.first:
                 _ends(state, curves, block, tau)
             _nonfinite(state, curves, tau)
             _block(state, curves, cells, block, tau)
     found = [_result(state) for state in states]
     return [
+        # of those that differ: whether the rows are dense enough to say so
         replace(c, note=_untold(ref, test, times, pair, c, time_scale)) if c.status == "differs" else c
         for c, pair in zip(found, pairs, strict=True)
     ]
@@ -95,20 +100,25 @@ def _untold(
 ) -> str:
     """Whether rows are too far apart for what differs between them."""
     at, excess = found.worst.time, (found.worst.ratio - 1.0) * found.limit
+    # where the difference is no number nothing can be said
     if not (math.isfinite(at) and math.isfinite(excess)):
         return ""
     cells = [int(cells_at(time, np.array([at]))[0]) for time in times]
+    # the cell with its neighbours
     rows = tuple((max(k - 1, 0), min(k + 3, time.size)) for k, time in zip(cells, times, strict=True))
     return untold(_curves(ref, test, times, rows, pair, time_scale), at, excess)
 
 
 def _state(ref: Source, pair: Pair, tolerance: Tolerance, rows: int) -> _State:
+    """The state of one pair before its first block: its nominal value and limit, or why there is none."""
     nominal = pair.ref.nominal
+    # no nominal value stored: the largest finite value of the reference
     if nominal is None:
         nominal = 0.0
         for first in range(0, rows, BLOCK):
             values = ref.read(pair.ref.name, first, min(first + BLOCK, rows))[0]
             nominal = max(nominal, float(np.max(np.abs(values[np.isfinite(values)]), initial=0.0)))
+    # a nominal value that is no size
     if not (math.isfinite(nominal) and nominal >= 0.0):
         note = f"its nominal magnitude in the reference is {nominal:g}"
         return _State(pair, nominal, math.nan, Worst(math.inf), "nominal", note)
@@ -116,7 +126,9 @@ def _state(ref: Source, pair: Pair, tolerance: Tolerance, rows: int) -> _State:
 
 
 def _result(state: _State) -> Compared:
+    # what no limit was found for counts as no number
     status = "nonfinite" if state.status == "nominal" else state.status
+    # beyond the limit somewhere
     if status == "equal" and state.worst.ratio > 1.0:
         status = "differs"
     return Compared(
@@ -138,12 +150,15 @@ class _Block:
 def _blocks(ref: Floats, test: Floats) -> Iterator[_Block]:
     """The common span in blocks; one empty block where it is a point or there is none."""
     low, high = max(ref[0], test[0]), min(ref[-1], test[-1])
+    # equal instants: cells of both coincide
     same = ref.size == test.size and np.array_equal(ref, test)
     edges = ref if same else np.concatenate([ref, test])
     edges = np.unique(edges[(edges >= low) & (edges <= high)])
+    # a point in common, or nothing
     if edges.size < 2:
         yield _Block(edges[:0], edges[:0], True, True, same)
         return
+    # blocks share their edges
     for first in range(0, edges.size - 1, BLOCK):
         part = edges[first : first + BLOCK + 1]
         yield _Block(part[:-1], part[1:], first == 0, first + BLOCK >= edges.size - 1, same)
@@ -151,8 +166,10 @@ def _blocks(ref: Floats, test: Floats) -> Iterator[_Block]:
 
 def _rows(time: Floats, block: _Block, tau: float) -> tuple[int, int]:
     """Rows that a block needs: those of its cells, those within tau, and all at its ends."""
+    # an empty block needs all rows
     if not block.left.size:
         return 0, time.size
+    # a row more on both sides: the cell in which the edge lies
     first = 0 if block.first else int(np.searchsorted(time, block.left[0] - tau, side="left")) - 1
     last = time.size if block.last else int(np.searchsorted(time, block.right[-1] + tau, side="right")) + 1
     return max(first, 0), min(last, time.size)
@@ -171,6 +188,7 @@ def _curves(
     values, rates = ref.read(pair.ref.name, a, b)
     one = Curve(times[0][a:b], values, rates)
     values, rates = test.read(pair.test.name, c, d)
+    # the test's values in the reference's units; rates by the ratio of both units
     if (pair.scale, pair.offset, time_scale) != (1.0, 0.0, 1.0):
         values = values * pair.scale + pair.offset
         rates = None if rates is None else rates * (pair.scale / time_scale)
@@ -179,35 +197,43 @@ def _curves(
 
 def _block(state: _State, curves: tuple[Curve, Curve], cells: tuple[Ints, Ints], block: _Block, tau: float) -> None:
     """Cells of one block: the largest difference, then the tube where it is beyond the limit."""
+    # nothing in common
     if not block.left.size:
         return
     pieces = [
         whole_cells(curve, cell) if block.same else bernstein(curve, cell, block.left, block.right)
         for curve, cell in zip(curves, cells, strict=True)
     ]
+    # where one has no rates both are compared as lines
     _as_lines(pieces, curves, cells, block, tau)
     with np.errstate(invalid="ignore", over="ignore"):
         difference = pieces[1] - pieces[0]
         size = np.abs(difference)
+    # a polynomial lies within its Bernstein coefficients
     bound = size.max(axis=0)
+    # somewhere no number
     if not math.isfinite(float(bound.max())):
         defined = [np.isfinite(curve.values) for curve in curves]
         whole = [d[cell] & d[cell + 1] for d, cell in zip(defined, cells, strict=True)]
+        # one trace has numbers where the other has none
         one = np.flatnonzero(whole[0] != whole[1])
         if one.size:
             _undefined_quantity(state, float(block.left[one[0]]), "only one of the traces is a number there")
+        # both are numbers and their difference is none
         bad = ~np.isfinite(bound)
         wild = np.flatnonzero(bad & whole[0] & whole[1])
         if wild.size:
             _undefined_quantity(state, float(block.left[wild[0]]), "the difference is beyond floating point")
         bound = np.where(bad, 0.0, bound)
         size = np.where(bad, 0.0, size)
+    # at the ends; inside only where the bound allows a larger one
     deviation = np.maximum(size[0], size[3])
     best = max(float(deviation.max()), state.worst.ratio * state.limit if math.isfinite(state.worst.ratio) else 0.0)
     x = np.where(size[3] > size[0], 1.0, 0.0)
     inner = np.flatnonzero((bound > best) | ((bound > state.limit) & (deviation <= state.limit)))
     if inner.size:
         deviation[inner], x[inner] = largest_magnitude(difference[:, inner])
+    # beyond the limit: within tau in time it may still be
     beyond = np.flatnonzero(deviation > state.limit)
     if beyond.size and tau > 0.0:
         moment = block.left + x * (block.right - block.left)
@@ -227,6 +253,7 @@ def _as_lines(
     """
     lines = [_lines(curve, cell) for curve, cell in zip(curves, cells, strict=True)]
     mixed = lines[0] != lines[1]
+    # partial cells count only where they are whole but for tau
     if mixed.any() and not block.same:
         apart = np.minimum(tau, SLIVER * (block.right - block.left))
         for curve, cell in zip(curves, cells, strict=True):
@@ -242,6 +269,7 @@ def _as_lines(
 
 def _lines(curve: Curve, cell: Ints) -> Flags:
     """Cells without a rate at one of their ends."""
+    # without rates all cells are lines
     if curve.rates is None:
         return np.ones(cell.size, dtype=np.bool_)
     known = np.isfinite(curve.rates)
@@ -261,11 +289,13 @@ def _forgive(
     order = beyond[np.argsort(-deviation[beyond], kind="stable")]
     best, size = 0.0, FIRST
     while order.size:
+        # in batches that grow: the largest difference first
         now, order = np.sort(order[:size]), order[size:]
         found = outside(*curves, block.left[now], block.right[now], moment[now], state.limit, tau)
         deviation[now] = np.minimum(found.distance, deviation[now])
         moment[now] = np.where(found.distance > 0.0, found.time, moment[now])
         best = max(best, float(deviation[now].max()))
+        # others can no longer win by more than a factor of two
         if order.size and best > state.limit and best >= 0.5 * deviation[order[0]]:
             # distances are at most the differences: the worst is known within a factor of two
             deviation[order] = np.minimum(deviation[order], best)
@@ -275,6 +305,7 @@ def _forgive(
 
 def _keep(state: _State, deviation: float, moment: float, k: int, pieces: Sequence[Floats], block: _Block) -> None:
     ratio = ratio_of(deviation, state.limit)
+    # the worst so far, or the first of equals
     if ratio > state.worst.ratio or (math.isnan(state.worst.time) and ratio == state.worst.ratio):
         width = block.right[k] - block.left[k]
         x = np.array([(moment - block.left[k]) / width if width > 0.0 else 0.0])
@@ -284,6 +315,7 @@ def _keep(state: _State, deviation: float, moment: float, k: int, pieces: Sequen
 
 def ratio_of(deviation: float, limit: float) -> float:
     """How many times the limit; 0 of 0 is 0."""
+    # equal values are within any limit, also within zero
     if deviation == 0.0:
         return 0.0
     return deviation / limit if limit > 0.0 else math.inf
@@ -303,8 +335,10 @@ def _undefined_quantity(state: _State, time: float, note: str) -> None:
 def _nonfinite(state: _State, curves: tuple[Curve, Curve], tau: float) -> None:
     """Each row that is no number has one of the same kind at the same instant in the other trace."""
     kinds = [_kinds(curve.values) for curve in curves]
+    # numbers everywhere
     if not (kinds[0].any() or kinds[1].any()):
         return
+    # each trace against the other
     for one, two, which in ((0, 1, "reference"), (1, 0, "test")):
         rows = np.flatnonzero(kinds[one])
         if not rows.size:
@@ -313,10 +347,12 @@ def _nonfinite(state: _State, curves: tuple[Curve, Curve], tau: float) -> None:
         at = curves[one].time[rows]
         found = np.zeros(rows.size, dtype=bool)
         near = np.searchsorted(time, at)
+        # the nearest rows on both sides, at the same instant to tau, of the same kind
         for step in (-1, 0, 1):
             k = np.clip(near + step, 0, time.size - 1)
             found |= (np.abs(time[k] - at) <= tau) & (kinds[two][k] == kinds[one][rows])
         inside = (at >= time[0] - tau) & (at <= time[-1] + tau)
+        # inside the other's span alone
         bad = np.flatnonzero(~found & inside)
         if bad.size:
             value, other = curves[one].values[rows[bad[0]]], {"reference": "test", "test": "reference"}[which]
@@ -334,14 +370,17 @@ def _ends(state: _State, curves: tuple[Curve, Curve], block: _Block, tau: float)
     """Rows that are the end of no cell: single points, more than two rows at one instant, jumps at the very ends."""
     for one, two in ((0, 1), (1, 0)):
         curve, other = curves[one], curves[two]
+        # rows that no cell holds
         for k in np.flatnonzero(lonely(curve.time)):
             instant, value = float(curve.time[k]), float(curve.values[k])
+            # what is no number is compared elsewhere
             if not math.isfinite(value):
                 continue
             low, high = band(other, instant, tau)
             if low > high:
                 continue  # the coverage says so
             distance = float(max(low - value, value - high, 0.0))
+            # farther outside the other's band than anything so far
             ratio = ratio_of(distance, state.limit)
             if ratio > state.worst.ratio:
                 nearest = float(low if value < low else high)

@@ -32,6 +32,7 @@ class Recorded:
         try:
             with self._faults():
                 self._layout()
+        # a file that is no trace is closed again
         except BaseException:
             self._file.close()
             raise
@@ -49,6 +50,7 @@ class Recorded:
     def _faults(self) -> Iterator[None]:
         try:
             yield
+        # faults of the library in words for the user
         except FileNotFoundError as error:
             raise TraceError(f"{self.path}: no such file") from error
         except (OSError, RuntimeError, ValueError, KeyError, TypeError, AttributeError, OverflowError) as error:
@@ -56,16 +58,20 @@ class Recorded:
             raise TraceError(f"{self.path}: {what}{in_words(error).removeprefix(what)}") from error
 
     def _layout(self) -> None:
+        """Takes in what the file holds: time, quantities with their rates, events, attributes."""
         import h5py
 
         data = {name: self._file[name] for name in self._file}
         sets = {name: item for name, item in data.items() if isinstance(item, h5py.Dataset) and name != "events"}
+        # any HDF5 file can be given: it may hold no trace
         if "time" not in sets:
             raise Incomparable(f"{self.path} has no data set 'time': not a trace")
         for name, item in sets.items():
+            # tables and texts are no quantities
             if item.ndim != 1 or item.dtype.kind not in "fiu":
                 raise Incomparable(f"{self.path}: '{name}' is no row of numbers")
         self._rates = {}
+        # a quantity names the data set of its rates
         for name, item in sets.items():
             path = _text(item.attrs.get("derivative", ""))
             rate = self._file.get(path) if path else None
@@ -79,6 +85,7 @@ class Recorded:
         self._sets = sets
         self.quantities = {name: self._about(name, item) for name, item in sets.items()}
         self.events = self._events(data.get("events"))
+        # traces of other programs have no such attributes: final and met
         self.final = bool(np.all(self._file.attrs.get("final", 1)))
         self.met = bool(np.all(self._file.attrs.get("met", 1)))
         tau = np.asarray(self._file.attrs.get("tau", math.nan))
@@ -86,6 +93,7 @@ class Recorded:
 
     def _about(self, name: str, item: Any) -> About:
         nominal = item.attrs.get("nominal")
+        # one finite number, or none
         if nominal is not None:
             array = np.asarray(nominal)
             nominal = float(array.ravel()[0]) if array.size == 1 and array.dtype.kind in "fiu" else math.nan
@@ -94,12 +102,15 @@ class Recorded:
 
     def _events(self, found: Any) -> tuple[TraceEvent, ...]:
         """/events: a group with `time` and `name`, or rows of both."""
+        # a trace without events
         if found is None:
             return ()
+        # a group has members, a table has fields
         fields = found.dtype.names if hasattr(found, "dtype") else tuple(found)
         if fields is None or not {"time", "name"} <= set(fields):
             raise Incomparable(f"{self.path}: /events has no time and name")
         times, names = np.asarray(found["time"], dtype=np.float64), np.asarray(found["name"])
+        # lists of unequal length, or far too long
         if times.shape != names.shape or times.ndim != 1 or times.size > EVENTS:
             raise Incomparable(f"{self.path}: /events is no list")
         return tuple(TraceEvent(float(t), _text(n)) for t, n in zip(times, names, strict=True))
@@ -113,6 +124,7 @@ class Recorded:
 
 
 def _text(value: Any) -> str:
+    # an attribute may be an array of one text, or bytes
     if isinstance(value, np.ndarray):
         value = value.item() if value.size == 1 else ""
     return value.decode("utf-8", "replace") if isinstance(value, bytes | np.bytes_) else str(value)

@@ -42,6 +42,7 @@ def outside(ref: Curve, test: Curve, left: Floats, right: Floats, moment: Floats
     there.  Cells hold no row of either curve inside.
     """
     with np.errstate(over="ignore", invalid="ignore"):
+        # each curve against the tube of the other: neither may leave it
         one = _one_way(with_extrema(ref), test, left, right, moment, eps, tau)
         two = _one_way(with_extrema(test), ref, left, right, moment, eps, tau)
     first = one.distance >= two.distance
@@ -51,9 +52,11 @@ def outside(ref: Curve, test: Curve, left: Floats, right: Floats, moment: Floats
 def band(curve: Curve, instant: float, tau: float) -> tuple[float, float]:
     """Least and largest value of a curve within tau of an instant; (inf, -inf) where it has none there."""
     time = curve.time
+    # rows within tau, then values at the edges
     inside = curve.values[np.searchsorted(time, instant - tau) : np.searchsorted(time, instant + tau, side="right")]
     found = list(inside[np.isfinite(inside)])
     edges = np.array([t for t in (instant - tau, instant, instant + tau) if time[0] <= t <= time[-1]])
+    # a curve of one instant has no cells
     if time.size > 1 and edges.size and time[-1] > time[0]:
         cell = cells_at(time, edges)
         b = bernstein(curve, cell, edges, edges)[0]
@@ -71,20 +74,25 @@ def _one_way(r: Curve, s: Curve, left: Floats, right: Floats, moment: Floats, ep
     def record(owner: Ints, found: Floats, at: Floats) -> None:
         order = np.argsort(found, kind="stable")  # the last write wins: the largest
         o, f, a = owner[order], found[order], at[order]
+        # better than what this cell has
         better = f > distance[o]
         distance[o[better]], time[o[better]] = f[better], a[better]
 
     for halving in range(HALVINGS + 1):
         if not left.size:
             break
+        # bound from above, sampled from below
         bound, sampled, at = _excess(r, s, left, right, tau, tables)
         record(owner, sampled, at)
+        # undecided: the samples are inside, the bound is not
         open_ = (bound > eps) & (sampled <= eps)
+        # too many or too small: the bound counts
         if halving == HALVINGS or 2 * np.count_nonzero(open_) > MANY:
             record(owner[open_], bound[open_], at[open_])
             break
         left, right, owner = left[open_], right[open_], owner[open_]
         middle = 0.5 * (left + right)
+        # a part that cannot be halved is as good as decided
         whole = (middle > left) & (middle < right)
         record(owner[~whole], bound[open_][~whole], left[~whole])
         left, middle, right, owner = left[whole], middle[whole], right[whole], owner[whole]
@@ -95,6 +103,7 @@ def _one_way(r: Curve, s: Curve, left: Floats, right: Floats, moment: Floats, ep
 
 def _divide_cells(r: Curve, left: Floats, right: Floats, moment: Floats, tau: float) -> tuple[Floats, Floats, Ints]:
     """Cells divided at `moment` and at rows of r, moved by tau or not; owner: the cell that each part is of."""
+    # all instants at which the band changes its shape
     cuts = np.concatenate([moment, r.time, r.time - tau, r.time + tau])
     cell = np.searchsorted(left, cuts, side="right") - 1
     inside = (cell >= 0) & (cuts > left[cell]) & (cuts < right[cell])
@@ -103,6 +112,7 @@ def _divide_cells(r: Curve, left: Floats, right: Floats, moment: Floats, tau: fl
     order = np.lexsort((starts, owner))
     starts, owner = starts[order], owner[order]
     last = np.append(owner[1:] != owner[:-1], True)
+    # of each part the end is the begin of the next, of the last the cell's
     ends = np.where(last, right[owner], np.append(starts[1:], 0.0))
     proper = ends > starts
     proper |= right[owner] <= left[owner]
@@ -114,19 +124,25 @@ def _excess(
 ) -> tuple[Floats, Floats, Floats]:
     """(upper bound [m] of the distance in each part, the distance sampled at both ends and the middle, where) ."""
     middle = 0.5 * (left + right)
+    # s on each part, as Bernstein coefficients
     own = bernstein(s, cells_at(s.time, middle), left, right)
     sides = []
+    # r shifted by tau both ways: the band's edges where r is monotone
     for shift in (-tau, tau):
         there = middle + shift
         b = bernstein(r, cells_at(r.time, there), left + shift, right + shift)
+        # beyond r's ends there is no edge
         b[:, (there < r.time[0]) | (there > r.time[-1])] = np.nan
         sides.append(b)
+    # rows of r within tau: the extrema in the band
     low = np.searchsorted(r.time, middle - tau, side="left")
     high = np.searchsorted(r.time, middle + tau, side="right")
     bound, sampled = np.zeros(left.size), np.zeros((3, left.size))
     x = np.array([0.0, 0.5, 1.0])
+    # above the band, then below it
     for sign, table in zip((1.0, -1.0), tables, strict=True):
         top = table.largest(low, high)
+        # s is above the band only where it is above all three
         differences = [sign * (own - b) for b in sides] + [sign * own - top]
         bounds = [np.where(np.isnan(d).any(axis=0), np.inf, largest(d)) for d in differences]
         bound = np.maximum(bound, np.minimum.reduce(bounds))
@@ -150,6 +166,7 @@ class _Ranges:
         found = np.full(count.size, -np.inf)
         level = np.frexp(np.maximum(count, 1).astype(np.float64))[1] - 1
         for k in np.unique(level[count > 0]):
+            # levels are built when they are first needed
             while len(self._levels) <= k:
                 last, step = self._levels[-1], 1 << (len(self._levels) - 1)
                 self._levels.append(np.maximum(last[:-step], last[step:]))

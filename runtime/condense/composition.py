@@ -34,6 +34,7 @@ class Composition:
     def values(self, factor: Floats) -> Floats:
         """The entries of T [entries] by the factors of the terms."""
         found = np.zeros(self.source.size)
+        # rows that read kept unknowns alone, then those that read them through others
         entry, term = self.direct
         np.add.at(found, entry, factor[term])
         for entry, term, through in self.levels:
@@ -58,6 +59,7 @@ def compose_definitions(start: Ints, kept: Ints, through: Ints) -> Composition:
     """Start [eliminated + 1]: the terms of each row; kept, through [terms]: the kept unknown that a term reads, or the
     eliminated one, whose row stands before; -1.
     """
+    # the row of each term, and how many sums stand between it and kept unknowns
     number = start.size - 1
     owner = np.repeat(np.arange(number, dtype=np.int32), np.diff(start))
     depth = _depth(number, owner, through)
@@ -65,9 +67,11 @@ def compose_definitions(start: Ints, kept: Ints, through: Ints) -> Composition:
     first, count = np.zeros(number, dtype=np.int32), np.zeros(number, dtype=np.int32)
     level: list[Ints] = [np.zeros(0, dtype=np.int32)]
     at = 0
+    # level by level: what a row reads through another one is known by then
     for k in range(int(depth.max(initial=-1)) + 1):
         mine = depth[owner] == k
         direct, indirect = places_of(mine & (kept >= 0)), places_of(mine & (through >= 0))
+        # a term that reads a defined unknown has as many parts as that has entries
         many = count[through[indirect]]
         entry = ranges(first[through[indirect]], many)
         term = np.concatenate([direct, np.repeat(indirect, many)])
@@ -79,16 +83,19 @@ def compose_definitions(start: Ints, kept: Ints, through: Ints) -> Composition:
         own = places_of(size > 0)
         rows.append(np.repeat(own, size[own]))
         columns.append(each)
+        # where the entries of these rows stand among all so far
         first[own], count[own] = at + begin[own], size[own]
         terms.append(term)
         read.append(np.concatenate([np.full(direct.size, -1, dtype=np.int32), entry]))
         slot += at
         level.append(slot)
         at += each.size
+    # all levels in the order of the rows
     row, column = np.concatenate(rows), np.concatenate(columns)
     final, starts, source = number_pairs(row, column, number, int(column.max(initial=-1)) + 1)
     del row, column, rows, columns
     parts = [(final[slot], term, by) for slot, term, by in zip(level, terms, read, strict=True)]
+    # terms by themselves, and terms times an entry of a level before
     direct_entry = np.concatenate([entry[by < 0] for entry, _, by in parts])
     direct_term = np.concatenate([term[by < 0] for _, term, by in parts])
     levels = tuple((entry[by >= 0], term[by >= 0], final[by[by >= 0]]) for entry, term, by in parts if (by >= 0).any())

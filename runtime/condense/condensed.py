@@ -91,6 +91,7 @@ class Condensed:
         self._keep: list[object] = []
         columns = self._products(terms)
         self._lay_out(columns)
+        # of a small system the order of rows does not matter to the elimination
         if self.unknowns == self.rows > SMALL and self._pair():
             self._lay_out(columns)
 
@@ -98,6 +99,7 @@ class Condensed:
         """Kept rows in the order of the unknowns that they belong to: those whose rate they read, then any matching.
         False where there is none, and the order stays.
         """
+        # rows that read a rate belong to the unknown whose rate it is
         form, columns, rows = self.whole.form, self.whole.pattern.columns_of(), self.whole.pattern.row
         row_at, at = numbers_of(self.whole.rows, self.kept_rows), numbers_of(self.whole.unknowns, self.kept)
         moving = self.whole.structural()[1]
@@ -105,6 +107,7 @@ class Condensed:
         column = at[np.concatenate([form.k_q, columns[moving]])]
         here = (row >= 0) & (column >= 0)
         row, column = row[here], column[here]
+        # pairs that are alone in their row and their column
         alone = np.bincount(row, minlength=self.rows)[row] == 1
         alone &= np.bincount(column, minlength=self.rows)[column] == 1
         own = np.full(self.unknowns, -1)
@@ -112,12 +115,14 @@ class Condensed:
         free = np.ones(self.rows, dtype=bool)
         free[row[alone]] = False
         del columns, rows, row_at, at, moving, row, column, here, alone  # of a large one the room counts
+        # the rest by a matching in the pattern that is left
         left, open_ = np.flatnonzero(own < 0), np.flatnonzero(free)
         entries = (own[self.pattern.columns_of()] < 0) & free[self.pattern.row]
         number, place = np.cumsum(own < 0) - 1, np.cumsum(free) - 1
         where = Places(place[self.pattern.row[entries]], number[self.pattern.columns_of()[entries]])
         rest, _ = compress(open_.size, left.size, [where])
         found = match_rows(rest)
+        # no matching: pairs found so far still say which rows belong to which unknowns
         if (found < 0).any():
             self.own_rows = own.astype(np.int32)
             return False
@@ -166,12 +171,14 @@ class Condensed:
 
     def _products(self, terms: Composition) -> Ints:
         """Which entries of the whole matrix add to this one with what factor; the column of each such product."""
+        # entries of kept rows
         system, found = self.whole, self.sums
         kept = np.zeros(system.rows, dtype=bool)
         kept[self.kept_rows] = True
         entry = places_of(kept[system.pattern.row])
         columns = system.pattern.columns_of()[entry]
         at, place = numbers_of(system.unknowns, self.kept)[columns], numbers_of(system.unknowns, found.place)[columns]
+        # entries of unknowns that nothing reads have no place here
         read = (at >= 0) | (place >= 0)
         entry, at, place = entry[read], at[read], place[read]
         del columns, read
@@ -179,6 +186,7 @@ class Condensed:
         gone = place >= 0
         count = np.ones(entry.size, dtype=np.int32)
         count[gone] = np.diff(terms.start)[place[gone]]
+        # terms of the sums in the place of the entries of defined unknowns
         term = ranges(terms.start[place[gone]], count[gone])
         through = places_of(np.repeat(gone, count))
         column = np.repeat(at, count)
@@ -223,6 +231,7 @@ class Condensed:
         """Says by that field which stretches hold families that are read, or sums of them: others are left out then;
         all do where it is not known of some block.
         """
+        # None: a block that does not say what it reads
         if None not in read:
             families = frozenset[int]().union(*(some or () for some in read))
             self._straights.mark(name, np.isin(self.whole.family_of, sorted(families)))
@@ -234,10 +243,12 @@ class Condensed:
     def _own_rows(self) -> Ints:
         """Kept rows q' - f as stretches (core/system/condensed.h), where no block adds to any and none is held."""
         whole, form = self.whole, self.whole.form
+        # rows q' - f to which a block of multipliers adds (index 2)
         firsts = [planned.to[(planned.to >= 0) & (planned.to < form.kinematics)] for planned in form.calls]
         row = numbers_of(whole.rows, self.kept_rows)[form.k_row]
         q = numbers_of(whole.unknowns, self.kept)[form.k_q]
         here = row >= 0
+        # rows that are more than q' - f are evaluated as all others
         if any(first.size for first in firsts) or whole.core.held or (q[here] < 0).any():
             return np.zeros((0, 4), dtype=np.int32)
         order = np.argsort(row[here], kind="stable")
@@ -248,6 +259,7 @@ class Condensed:
         blocks, form = self.whole.description.blocks, self.whole.form
         planned = [call.block for call in (*form.calls, *form.scales)]
         rates = [kernel.rates for block in planned for kernel in blocks.get(block, ())]
+        # without stretches, or where a block does not say whose rates it reads: all
         if not self._own.size or None in rates:
             return np.ones(self.unknowns, dtype=bool)
         read = frozenset[int]().union(*(families for families in rates if families))
@@ -260,8 +272,10 @@ class Condensed:
         kept[self.kept_rows] = True
         here = kept[form.k_row]
         number = self._number
+        # places of what is left, in the numbering of the entries that are read
         slot_q, slot_f = (self._hold(np.ascontiguousarray(number[slots][here])) for slots in whole.slots[:2])
         spans = stretches(*(np.ascontiguousarray(part[here]) for part in (form.k_row, form.k_q, form.k_f)))
+        # entries go to places of their own: of those not read to one that all share
         elsewhere = redirect_entries(whole, number, number, self.places)
         self._keep.append(elsewhere)
         made = elsewhere.core
@@ -276,11 +290,13 @@ class Condensed:
 
     def renumber(self) -> None:
         """Gives the entries that are read numbers of their own, and the others one place together: once."""
+        # products of one column stand together: so many lines of so many entries
         column = self.whole.pattern.columns_of()[self._from]
         begin = np.flatnonzero(np.diff(column, prepend=-1))
         width = np.diff(begin, append=column.size)
         change = np.flatnonzero(np.diff(width, prepend=-1))
         self._shapes = list(zip(np.diff(change, append=width.size).tolist(), width[change].tolist(), strict=True))
+        # an entry that no product reads has no number of its own
         read = np.zeros(self.whole.pattern.entries, dtype=bool)
         read[self._from] = True
         self.places = int(read.sum()) + 1
@@ -292,11 +308,13 @@ class Condensed:
     def make(self) -> None:
         """The core's structures, of entries that are numbered: once."""
         whole = self.whole
+        # families that the ledgers read, and whose rates the observers show
         self._mark("audited", [kernel.reads for kernel in self._kernels(AUDITED)])
         self._mark("rated", [kernel.rates for kernel in self._kernels(SHOWING)])
         self._own = self._own_rows()
         self._trim = self._trim_rows()
         del self._number
+        # lists of places as stretches, which are few
         unknown, row = self._spans(self.kept), self._spans(self.kept_rows)
         rate = self._spans(self.kept, self._rate_columns())
         rest = self._spans(self.kept_rows, self.kept_rows >= (whole.form.kinematics if self._own.size else 0))
@@ -342,8 +360,10 @@ class Condensed:
     def _told_products(self) -> dict[str, int | None]:
         """The products as the core has them: of a large system by stretches, where these are few."""
         found = None
+        # of a large system as lines that repeat, if they are few
         if self.whole.unknowns > LARGE:
             found = stretches_of([self._from, self._to], self._shapes, self._share)
+        # else places one by one
         if found is None:
             places = {"from_": self._hold(self._from), "to": self._hold(self._to), "share": self._hold(self._share)}
             return {"products": self._from.size, **places}
@@ -352,6 +372,7 @@ class Condensed:
             tables = *table(self._from, found[k]), *table(self._to, found[k])
             held = [*(self._hold(item) for item in tables), self._hold(self._share[at : at + width].copy())]
             made[k] = lib.Shares(number, width, *held)
+        # what the stretches say is let go
         self._keep.append(made)
         nothing = np.zeros(0, dtype=np.int32)
         self._from, self._to, self._share = nothing, nothing, np.zeros(0)
@@ -368,6 +389,7 @@ class Condensed:
     @cached_property
     def rates(self) -> Ints:
         """Numbers of kept unknowns whose derivatives occur."""
+        # entries of rates in rows that are kept
         columns, rows = self.whole.pattern.columns_of(), self.whole.pattern.row
         here = np.zeros(self.whole.rows, dtype=bool)
         here[self.kept_rows] = True

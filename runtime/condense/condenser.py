@@ -49,6 +49,7 @@ class Forms:
         """Elimination order of the stepped form's matrices [kept], found once."""
         stepped, whole = self.stepped, self.stepped.whole
 
+        # rows already stand in the order of their unknowns
         def make_order() -> Order:
             if stepped.paired:
                 return Order(paired_order(stepped.pattern), paired=True)
@@ -62,10 +63,12 @@ class Forms:
         runs do not integrate those, and what moves charge at once passes all of a node's.
         """
         whole, still = self.settled.whole, np.zeros(y.size)
+        # rows of displacement constraints through which what nothing reads is known
         unread = np.isin(np.arange(y.size), self.settled.unread)
         row, column = whole.pattern.row, whole.pattern.columns_of()
         entry = np.flatnonzero(unread[column] & whole.of_groups("phi")[row])
         rows, at = np.unique(row[entry], return_inverse=True)
+        # the least change that meets them, to first order
         slope, miss = whole.jacobian(t, y, still)[0][entry], whole.residual(t, y, still)[rows]
         return y + least_norm((rows.size, y.size), (at, column[entry], slope), -miss)
 
@@ -92,6 +95,7 @@ class _Condenser:
     def forms(self, t: float, y: Floats, yd: Floats) -> Forms | None:
         """With the numbers of now; of the same start and parameters those of the last time."""
         digest = sha256()
+        # the same start and parameters as the last time: the same forms
         for item in (np.array([t]), y, yd, self.whole.description.p):
             digest.update(np.ascontiguousarray(item).data)
         asked = digest.digest()
@@ -103,21 +107,28 @@ class _Condenser:
         return found
 
     def _renew(self, t: float, y: Floats, yd: Floats) -> Forms | None:
+        """The forms at these numbers; None where little would leave, or sums are no numbers. Structures are found anew
+        only where other entries may define.
+        """
         whole = self.whole
         large, zero = whole.unknowns > LARGE, np.zeros(whole.unknowns)
         constant = whole.residual(t, zero, zero)
         del zero
         jy = None if large else whole.slopes(t, y, yd, rate=False)
+        # of a large system the slopes are found twice rather than held
         allowed = definable(whole, whole.slopes(t, y, yd, rate=False) if jy is None else jy, constant, y)
         if self._found is None or not np.array_equal(allowed, self._allowed):
             self._allowed, self._found, self._forms = allowed, eliminate(whole, allowed), None
         found = self._found
         jy = whole.slopes(t, y, yd, rate=False) if jy is None else jy
+        # too little leaves to pay for the detour
         few = found.place.size + found.unread.size < (1.0 - GAIN) * whole.unknowns
+        # a definition whose entries are no numbers
         if few or not np.isfinite(jy[found.entry]).all():
             return None
         numbers = sums(whole, found, jy, constant)
         del jy, constant
+        # constants that are no numbers
         if not np.isfinite(numbers.constant).all():
             return None
         if large:  # the room counts: other numbers find all anew
@@ -128,8 +139,10 @@ class _Condenser:
             whole.spare()
             whole.trim()
             return self._make_forms(held)
+        # no forms yet for this structure
         if self._forms is None:
             self._forms = self._make_forms([found, numbers])
+        # the same structure with other numbers
         elif not numbers.same(self._numbers):
             self._numbers, factors = numbers, self._terms.values(numbers.factor)
             self._straights.renew(numbers)
@@ -143,23 +156,27 @@ class _Condenser:
         found: Elimination = held.pop()
         whole = self.whole
         rows = np.ones(whole.rows, dtype=bool)
+        # rows that define an unknown, and rows q' - f of what nothing reads
         rows[found.row] = False
         rows[whole.form.k_row[np.isin(whole.form.k_q, found.unread)]] = False
         del found
         terms, straights = numbers.composition(whole.unknowns), Straights(numbers)
         straights.renew(numbers)
         factors = terms.values(numbers.factor)
+        # a large system keeps only what it steps with
         if whole.unknowns > LARGE:
             straights.fix()
             terms, numbers = terms.places(), numbers.places()
         else:
             self._terms, self._straights, self._numbers = terms, straights, numbers
         kept = settled_rows(whole, self.settled_system, ~rows, numbers)
+        # rows of rates that observers read would be open
         if kept is None:
             return None
         rows_of = {whole: places_of(rows), self.settled_system: places_of(kept)}
         del rows, kept
         made = {}
+        # the settled form first: of a large system its pattern is let go before the other's is made
         for system in (self.settled_system, whole):
             form = made[system] = Condensed(system, numbers, terms, straights, rows_of.pop(system))
             form.renew(factors)
@@ -175,6 +192,7 @@ class _Condenser:
         for form in made.values():
             if whole.unknowns > LARGE:
                 form.put_away()
+        # both forms evaluate the whole system in the same room
         room = Room(max(form.places for form in made.values()), whole, self.settled_system)
         return Forms(made[whole], made[self.settled_system], room)
 
@@ -184,8 +202,10 @@ def condense_model(system: System, t: float, y: Floats, yd: Floats) -> Forms | N
     rest does not follow from what is kept alone.  The next call for the system may take the structures of this one.
     """
     least = STEEP if system.form.scales else LEAST
+    # a small system, another form, redundant constraints or constraints that hold at times
     if system.unknowns < least or system.form.name != "3" or system.left_out or system._may_hold[0].size:
         return None
+    # rows of constraints whose entries move
     if not system.once("steady", lambda: steady(system.description)):
         return None
     return system.own("condensed", lambda: _Condenser(system)).forms(t, y, yd)
@@ -198,6 +218,7 @@ def departures(system: System) -> list[tuple[str, str]]:
     if found is None:
         return []
     parts = ((found.stepped.gone, DEFINED), (found.stepped.unread, UNREAD))
+    # arrays by their first element: `C[0] ..`
     names = [f.name if not f.elements else f"{f.name_of(0)} .." for f in system.description.families]
     return [
         (f"{names[k]} ({number} of {system.description.families[k].size})", why)

@@ -62,6 +62,7 @@ def unread_families(description: Description, blocks: Iterable[str]) -> tuple[in
     read: set[int] = set()
     for block in (*blocks, *OBSERVERS):
         for kernel in description.blocks.get(block, ()):
+            # a block that does not say what it reads may read all
             if kernel.reads is None:
                 return ()
             read |= kernel.reads
@@ -74,6 +75,7 @@ def affine(system: System) -> Mask:
     for group, family, first in system.form.groups:
         blocks = [block for block, into in FORMS[system.form.name] if into == group]
         kernels = [kernel for block in blocks for kernel in system.description.blocks.get(block, ())]
+        # a row is affine where no kernel of its group is curved in it
         if all(kernel.curved is not None and family not in kernel.curved for kernel in kernels):
             found[first : first + system.description.rows[family].size] = True
     return found
@@ -91,11 +93,14 @@ def _candidates(system: System) -> tuple[Ints, Mask, Mask]:
     """
     columns, rows = system.pattern.columns_of(), system.pattern.row
     moving = system.structural()[1]
+    # displacements that only their own kinematics read: charges of sources
     unread = unread_families(system.description, (call.block for call in system.form.calls))
     gone = np.isin(system.family_of, unread) & system.are("q")
     usable = affine(system)
+    # rows with rates define no unknown: their derivative would be needed
     usable[rows[moving]] = False
     carried = np.zeros(system.unknowns, dtype=bool)
+    # what has a rate is a state: it stays
     carried[columns[moving]] = carried[system.form.k_q] = True
     return places_of(usable[rows]), gone, carried & ~gone
 
@@ -107,23 +112,28 @@ def definable(system: System, jy: Floats, constant: Floats, y: Floats) -> Mask:
     """
     columns, rows = system.pattern.columns_of(), system.pattern.row
     size = np.abs(jy)
+    # entries that are no numbers define nothing
     del jy
     size[~np.isfinite(size)] = 0.0
     here, gone, carried = system.once("may leave", lambda: _candidates(system))
     i, j = rows[here], columns[here]
+    # |entry times value|: the term of the unknown in its row
     weight, term = size[here], y[j]
     np.multiply(weight, np.abs(term, out=term), out=term)
     terms = np.abs(constant)
     np.fmax.at(terms, i, term)
+    # a small difference of large terms would lose its digits
     cancels = (term < HEALTHY * terms[i]) & (term > NOISE * terms[i])
     del term, terms
     by_row, by_column = sparse_factors(rows, columns, size, (system.rows, system.unknowns))
+    # equilibrated, so that units do not decide which entry is large
     weight *= by_row[i]
     weight *= by_column[j]
     del size, by_row, by_column, columns  # of a large one the room counts
     largest = np.zeros(system.rows)
     np.maximum.at(largest, i, weight)
     reads = weight > 0.0
+    # x = 5 y: a multiple of a state, whatever the factor
     multiple = (np.bincount(i[reads], minlength=system.rows) == 2) & (constant == 0.0)
     multiple &= np.bincount(i[reads & carried[j]], minlength=system.rows) == 1
     found = np.zeros(rows.size, dtype=bool)
@@ -165,6 +175,7 @@ class _Search:
     """
 
     def __init__(self, system: System, allowed: Mask) -> None:
+        # entries in the order of rows, and where each row begins
         self.columns, self.rows = system.pattern.columns_of(), system.pattern.row
         self.of, self.allowed = system.family_of[self.columns], allowed
         entries = np.arange(self.rows.size, dtype=np.int32)
@@ -173,14 +184,17 @@ class _Search:
         self.seen: dict[tuple[int, int], _Span] = {}
         self.defined, self.free = np.zeros(system.unknowns, dtype=bool), np.ones(system.rows, dtype=bool)
         self.reads: dict[int, set[int]] = {}
+        # which families a defined one reads, who reads it, and how deep it stands
         self.readers: dict[int, set[int]] = {}
         self.below: dict[int, int] = {}
         self.above: dict[int, int] = {}
         self.read: set[int] = set()
         self.parts: list[tuple[int, Ints]] = []
+        # families in spans of rows: whole families are defined at once
         spans = [(first, first + system.description.rows[family].size) for _, family, first in system.form.groups]
         pairs = [(family, span) for span in spans for family in self._span(span).families]
         sizes = {pair: self._candidates(*pair).size for pair in pairs}
+        # those that define most first; among equals by kind
         for family, span in sorted(pairs, key=lambda pair: (-sizes[pair], _rank(system, pair[0]), pair)):
             if sizes[family, span]:
                 self._take(family, span)
@@ -198,9 +212,11 @@ class _Search:
         several rows that could define an unknown the first.
         """
         seen = self._span(span)
+        # an unknown that stands once in its row
         entries, own, of = seen.entries, seen.rows, seen.of
         here = of == family
         once = np.bincount(own[here], minlength=span[1] - span[0]) == 1
+        # rows that read what is defined through this family would close a circle
         blocked = [k for k in seen.families if k != family and self._through(k, family)]
         once[own[np.isin(of, blocked)]] = False
         found = entries[here & once[own]]
@@ -209,9 +225,11 @@ class _Search:
 
     def _through(self, first: int, family: int) -> bool:
         """Whether a family is defined through another one, or might be: no more than SEARCHED are looked at."""
+        # nothing is defined through it
         if first not in self.reads or family not in self.read:
             return False
         seen, open_ = {first}, [first]
+        # a search in the graph of definitions, cut off where it grows long
         while open_ and len(seen) <= SEARCHED:
             more = self.reads.get(open_.pop(), set()) - seen
             if family in more:
@@ -221,16 +239,20 @@ class _Search:
         return bool(open_)
 
     def _take(self, family: int, span: tuple[int, int]) -> None:
+        """Defines what these rows can define of a family, unless a chain of definitions would grow too long."""
         chosen = self._candidates(family, span)
         if not chosen.size:
             return
+        # what these rows read besides
         entries = self._span(span).entries
         taken = entries[np.isin(self.rows[entries], self.rows[chosen])]
         others = _numbers(self.of[taken]) - {family}
         below = 1 + max((self.below[k] for k in others if k in self.reads), default=0)
+        # each link of a chain loses digits
         if below + self.above.get(family, 0) > LONGEST:
             return
         self._definition_depths(family, others, below)
+        # one row defines one unknown
         self.defined[self.columns[chosen]] = True
         self.free[self.rows[chosen]] = False
         self.read |= others
@@ -240,15 +262,18 @@ class _Search:
         """below[k]: definitions that k is made of one after the other, its own with them; above[k]: those that it is
         part of.
         """
+        # the family reads these, and they know their reader
         self.reads.setdefault(family, set()).update(others)
         for k in others:
             self.readers.setdefault(k, set()).add(family)
+        # upwards: those who read it stand deeper
         work = [(family, below)]
         while work:
             k, depth = work.pop()
             if depth > self.below.get(k, 0):
                 self.below[k] = depth
                 work += [(r, depth + 1) for r in self.readers.get(k, ())]
+        # downwards: what it reads is part of more
         work = [(k, self.above.get(family, 0) + 1) for k in others]
         while work:
             k, depth = work.pop()
@@ -260,6 +285,7 @@ class _Search:
         """How many definitions a family is defined through, one after the other."""
         found: dict[int, int] = {}
         for first in self.reads:
+            # depth first without recursion: a family after all that it reads
             path = [first]
             while path:
                 new = [k for k in self.reads.get(path[-1], ()) if k not in found]
@@ -272,10 +298,12 @@ class _Search:
     def found(self, unread: Ints) -> Elimination:
         """The unknowns, families that others read first, each in the order of its places."""
         none = np.zeros(0, dtype=np.int32)
+        # one after the other, in order of depth: each reads only those before it
         pivot = np.concatenate([none, *(part for _, part in self.parts)])
         depths = self._depths()
         depth = np.concatenate([none, *(np.full(part.size, depths[f], dtype=np.int32) for f, part in self.parts)])
         pivot = pivot[np.lexsort((self.columns[pivot], depth))]
+        # entries of the defining rows but the pivots
         row = self.rows[pivot]
         begin, count = self.start[row], self.start[row + 1] - self.start[row]
         others = np.ones(self.rows.size, dtype=bool)

@@ -33,28 +33,34 @@ def settled_rows(stepped: System, settled: System, gone: Mask, numbers: Sums) ->
     balances it would be open, or rates that observers read.
     """
     description = settled.description
+    # rows of both forms meet by group and family
     first = {(group, family): at for group, family, at in stepped.form.groups}
     kept = np.ones(settled.rows, dtype=bool)
     for group, family, at in settled.form.groups:
         home, size = first.get((RATE_OF.get(group, group), family)), description.rows[family].size
+        # a row whose home is gone is gone with it
         if home is not None:
             kept[at : at + size] = ~gone[home : home + size]
     columns, rows = settled.pattern.columns_of(), settled.pattern.row
     lost = np.zeros(settled.unknowns, dtype=bool)
     lost[numbers.unread] = True
+    # rows that read what nothing else reads
     kept[rows[lost[columns]]] = False
     derived = np.zeros(settled.unknowns, dtype=bool)
     derived[numbers.place] = True
+    # rows that read the rate of a defined unknown
     moving = settled.structural()[1]
     dropped = np.zeros(settled.rows, dtype=bool)
     dropped[rows[moving & derived[columns]]] = True
     dropped &= kept
     rates = moving & derived[columns] & dropped[rows]
+    # those rows must define these rates and nothing else
     if not _defining(rows[rates], columns[rates]):
         return None
     read = {family for kernel in description.blocks.get("observe_rate", ()) for family in kernel.rates or ()}
     open_ = np.zeros(settled.unknowns, dtype=bool)
     open_[columns[moving & dropped[rows] & ~derived[columns]]] = True
+    # an observer shows a rate that would be open
     if read & settled.families_in(open_):
         return None
     return kept & ~dropped

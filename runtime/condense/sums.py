@@ -51,9 +51,11 @@ class Sums:
 
 def sums(system: System, found: Elimination, jy: Floats, constant: Floats) -> Sums:
     """The numbers of an elimination: jy [entries]; constant [rows]: the rows where all unknowns are zero."""
+    # row: pivot e + rest + sum factor z = 0, solved for e
     pivot = jy[found.pivot]
     rest = constant[found.row]
     factor = -jy[found.entry] / np.repeat(pivot, np.diff(found.start))
+    # what is neither defined nor unread is kept
     left = np.ones(system.unknowns, dtype=bool)
     left[found.place] = left[found.unread] = False
     source = system.pattern.columns_of()[found.entry]
@@ -72,6 +74,7 @@ class Straights:
     """Stretches of eliminated unknowns whose terms read stretches, as the core has them: array, number."""
 
     def __init__(self, found: Sums) -> None:
+        # places and numbers of terms that go on by one make a stretch
         count, number = np.diff(found.start), found.place.size
         same = np.diff(found.place) == 1
         same &= np.diff(count) == 0
@@ -81,13 +84,16 @@ class Straights:
         above -= np.repeat(np.append(np.int32(0), count[:-1]), count)
         steps = np.ones(found.source.size, dtype=bool)
         steps[inner] = found.source[inner] == found.source[above[inner]] + 1
+        # a term whose place does not go on by one begins another stretch
         broken = np.zeros(number, dtype=bool)
         owner = np.repeat(np.arange(number, dtype=np.int32), count)
         broken[owner[~steps]] = True
         begin: NDArray[np.integer] = np.flatnonzero(np.concatenate([[True], ~same])[:number] | broken)
+        # factors that change within a stretch
         unlike = np.zeros(number, dtype=bool)
         unlike[owner[inner][found.factor[inner] != found.factor[above[inner]]]] = True
         begin = self._cut(begin, unlike)
+        # lengths and first terms of the stretches
         length = np.diff(np.append(begin, number))
         terms, entry = count[begin], found.start[begin]
         self._begin, self._some = begin, np.zeros(begin.size, dtype=bool)
@@ -96,10 +102,12 @@ class Straights:
         self._source, offset = found.source[ranges(entry, terms)], np.cumsum(terms) - terms
         self.array, self.number = (lib.Straight * max(begin.size, 1))(), int(begin.size)
         lines = self._lines = np.frombuffer(memoryview(self.array), dtype=LINE)[: begin.size]
+        # the table that the core reads: addresses of sources, factors, constants
         lines["place"], lines["number"], lines["terms"] = found.place[begin], length, terms
         lines["audited"] = lines["rated"] = 1
         lines["source"] = self._source.ctypes.data + self._source.itemsize * offset
         lines["factor"] = self._factors.ctypes.data + self._factors.itemsize * entry.astype(np.int64)
+        # long stretches of few terms may have one factor for all
         long = np.flatnonzero((length >= LONG) & (terms > 0) & (terms <= MOST_ALIKE))
         sizes = length[long] * terms[long]
         self._long = [tuple(map(int, line)) for line in zip(long, entry[long], sizes, strict=True)]
@@ -117,9 +125,11 @@ class Straights:
     @staticmethod
     def _cut(begin: NDArray[np.integer], unlike: Mask) -> NDArray[np.integer]:
         """Where stretches begin, once long ones are cut where factors change, if these are few: an end of a line."""
+        # the begin of a stretch is a cut already
         unlike[begin] = False
         changes = np.add.reduceat(unlike, begin, dtype=np.int64) if begin.size else begin
         length = np.diff(np.concatenate([begin, [unlike.size]]))
+        # cut only where the pieces stay long
         unlike &= np.repeat(changes * LONG <= length, length)
         return np.union1d(begin, np.flatnonzero(unlike))
 
@@ -127,10 +137,12 @@ class Straights:
         """Takes the numbers of other sums of the same structure."""
         self._factors[:] = found.factor[self._order]
         self._constants[:] = found.constant
+        # a stretch whose constants are all zero has no address of them
         some = np.logical_or.reduceat(found.constant != 0.0, self._begin) if self._begin.size else self._some
         there = self._constants.ctypes.data + self._constants.itemsize * self._begin
         self._lines["constant"] = np.where(some, there, 0)
         self._some = some
+        # factors that are the same along a stretch are read once
         for number, entry, size in self._long:
             factor = self._factors[entry : entry + size].reshape(self.array[number].terms, -1)
             self.array[number].alike = factor.shape[1] if (factor == factor[:, :1]).all() else 0
@@ -139,11 +151,13 @@ class Straights:
         """Says by the field of that name which stretches hold an unknown that is read [unknowns], or that such a one is
         a sum of.
         """
+        # backwards: a sum that is read reads its sources
         wanted, here = bytearray(read), bytearray(self.number)
         parts = (self._lines[part].tolist() for part in ("place", "number", "terms"))
         source, behind = self._source.tolist(), self._source.size
         for k, (place, number, terms) in reversed(list(enumerate(zip(*parts, strict=True)))):
             behind -= terms  # sums come behind what they read
+            # one is read: the whole stretch is evaluated
             if 1 in wanted[place : place + number]:
                 here[k] = 1
                 for first in source[behind : behind + terms]:
@@ -153,11 +167,13 @@ class Straights:
     def fix(self) -> None:
         """Lets go of what only other numbers would need, of factors that repeat one, of constants that are all zero."""
         self._order = self._order[:0].copy()
+        # of factors that are alike the first one stays
         kept = np.ones(self._factors.size, dtype=bool)
         for number, entry, size in self._long:
             if length := self.array[number].alike:
                 kept[entry : entry + size].reshape(-1, length)[:, 1:] = False
                 self.array[number].alike = 1
+        # addresses move as entries leave
         place = np.append(np.int32(0), np.cumsum(kept, dtype=np.int32))
         size = self._factors.itemsize
         at = (self._lines["factor"].astype(np.int64) - self._factors.ctypes.data) // size

@@ -37,12 +37,14 @@ class ContactRest:
         self._frictions = [k for k, c in enumerate(plan.contacts) if c.kind in ("friction", "planar")]
         self._of: dict[tuple[bool, ...], Resting] = {}
         self.share = SHARE
+        # the state that a run was left in, and the one in which frictions stick
         started = self.contacts.state()
         self._stick()
         self._begins = dict.fromkeys((self.contacts.state(), started))  # what rubs on a belt slips at rest
         self.contacts.size(self.problem(first).scale, 1.0)
         self._last: Rest | None = None
 
+    # the sense of a friction that sticks is none
     def _stick(self) -> None:
         for k in self._frictions:
             self.contacts.active[k] = True
@@ -51,6 +53,7 @@ class ContactRest:
 
     def _resting(self) -> Resting:
         """The equations with what holds now."""
+        # equations are made once for each active set
         key = tuple(self.contacts.active.tolist())
         if key not in self._of:
             self._of[key] = Resting(self.system, self.tangible, self.t, self.first)
@@ -75,7 +78,7 @@ class ContactRest:
         return next((rest for begin in self._begins if (rest := self._fitting(guess, begin)) is not None), None)
 
     def _fitting(self, guess: Floats, begin: tuple[float, ...]) -> Rest | None:
-        """The same, from a state of the contacts."""
+        """The state of rest from a guess and a state of the contacts; None where no active set fits."""
         self.contacts.become(begin)
         self.contacts.through.clear()
         pivoting = Pivoting(self.contacts, lambda *_: False)
@@ -85,12 +88,15 @@ class ContactRest:
             return None
         assert self._last is not None
         kept, state = self._last, self.contacts.state()
+        # a friction that slips at its bound while nothing moves sticks there
         if not all(self.contacts.active[k] for k in self._frictions):  # at its bound, and at rest: it sticks
             loaded = self._load_frictions(kept.state.y, kept.state.yd)
             self._stick()
             sticking = self._settle(self.t, loaded, kept.state.yd, loaded)
+            # sticking counts only where it fits too
             if sticking is not None and self.contacts.fits(self.t, loaded, sticking):
                 kept, state = self._last, self.contacts.state()
+            # the words of the report are those of the state that was found
             self.contacts.become(state)
         switches = self.system.description.switches
         words = {c.name: self.contacts.word(k) for k, c in enumerate(self.contacts.contacts) if c.kind != "follows"}
@@ -102,10 +108,13 @@ class ContactRest:
         values = contacts.observer(self.t, y, yd)
         for k in self._frictions:
             contact, place = contacts.contacts[k], contacts.multiplier[k]
+            # a friction that sticks, or has no multiplier, carries what the rows say
             if contacts.active[k] or place < 0:
                 continue
+            # along a line: its bound, with the sense of its slip
             if contact.kind == "friction":
                 y[place] = contacts.p[contact.sense] * values[contact.bound]
+            # in a plane: its bound along the direction of its slip
             else:
                 along = contacts.p[list(contact.direction)]
                 y[[place, contacts.multiplier[k + 1]]] = values[contact.upper] * along / np.hypot(*along)
@@ -149,14 +158,17 @@ class SampledRest:
     def found(self, guess: Floats) -> Rest | None:
         """The state of rest that is come to from a guess; None where a sample would change something there."""
         rest = self.equations.found(guess)
+        # no rest from this guess
         if rest is None:
             return None
         state, p = rest.state, self.system.description.p
         values, changed = self.observer(state.t, state.y, state.yd), dict[str, None]()
+        # what each sample would set, against what stands
         for event in self.sampled:
             for a in event.assignments:
                 now = float(p[a.place] if a.kind == "discrete" else state.y[a.place])
                 size = SAME * max(abs(now), abs(values[a.row])) + self.observer.zero(a.row)
+                # a change beyond round-off: the next sample would leave the rest
                 if not abs(values[a.row] - now) <= size:
                     changed[f"'{event.name}' sets {a.name} from {now:.6g} to {values[a.row]:.6g}"] = None
         self.changes |= changed

@@ -67,6 +67,7 @@ def balance_matrix(a: Floats) -> tuple[Floats, Floats]:
     """D^-1 a D with rows and columns of like size, and the diagonal of D (powers of two)."""
     from scipy.linalg import matrix_balance
 
+    # LAPACK refuses an empty matrix
     if not a.size:
         return a, np.ones(0)
     found, (scale, _) = matrix_balance(a, permute=False, separate=True)
@@ -75,16 +76,20 @@ def balance_matrix(a: Floats) -> tuple[Floats, Floats]:
 
 def modes(a: Floats, precisely: Decomposed | None = None) -> tuple[Mode, ...]:
     """The modes of x' = a x, by rising real part, then imaginary part; precisely: of a in many digits."""
+    # a model without states
     if not a.size:
         return ()
+    # many digits: eigenvectors of both sides are known
     if precisely is not None:
         share = np.abs(precisely.right * precisely.left.T)
         total = share.sum(axis=0)
         return _sort_modes(precisely.values, share / np.where(total > 0.0, total, 1.0), precisely.right)
     inner, scale = balance_matrix(a)
     values, right = np.linalg.eig(inner)
+    # small eigenvalues beside large ones lose digits: mended, or zero
     values = _resolve_eigenvalues(_sharpen_small(values, inner), inner)
     share = np.abs(right) ** 2
+    # a defective matrix has no left vectors: the share is that of the right ones
     if np.linalg.cond(right) < DEFECTIVE:
         share = np.abs(right * np.linalg.inv(right).T)
     return _sort_modes(values, share / share.sum(axis=0), scale[:, None] * right)
@@ -98,12 +103,15 @@ def _sort_modes(values: Complexes, share: Floats, right: Complexes) -> tuple[Mod
 def _sharpen_small(values: Complexes, a: Floats) -> Complexes:
     """Eigenvalues whose round-off is that of the largest: small ones from the inverse, where that is to be trusted."""
     size = np.abs(values)
+    # close together, or singular: what stands is as good
     if values.size < 2 or not size.max() > APART * size.min() or not regular(a):
         return values
     inverse = np.linalg.eigvals(np.linalg.inv(a))
+    # the inverse says nothing
     if not np.abs(inverse).min() > 0.0 or not size.min() > 0.0:
         return values
     other = 1.0 / inverse
+    # matched in order of their sizes, the small ones from the inverse
     one, two = (_by_size(v.astype(complex)) for v in (values, other))
     found = values.astype(complex)
     small = size[one] < np.sqrt(size.max() * max(size.min(), 1e-300))
@@ -125,6 +133,7 @@ def _resolve_eigenvalues(values: Complexes, a: Floats) -> Complexes:
 
 
 def _mode(value: complex, share: Floats, right: Complexes) -> Mode:
+    # the shape in units of its largest component
     size = abs(value)
     largest = right[int(np.argmax(np.abs(right)))]
     shape = np.asarray(right / largest if largest != 0.0 else right, dtype=np.complex128)
@@ -146,6 +155,7 @@ def transfer(
     a: Floats, b: Floats, c: Floats, d: float, place: tuple[int, int], improper: tuple[float, float]
 ) -> Transfer:
     """One output by one input; b, c [states]; place: output, input; improper: slopes by the input's rates."""
+    # balanced, then cut to what the input reaches and the output sees (Kalman)
     inner, scale = balance_matrix(a)
     first = _first_markov(inner, b / scale, c * scale)
     inner, b, c = reachable_part(inner, b / scale, c * scale)
@@ -153,6 +163,7 @@ def transfer(
     inner = inner.T
     zeros, gain = _zeros(inner, b, c, d, first)
     zeros = _at_origin(inner, b, c, d, zeros)
+    # poles of what is left; zeros at the origin are known exactly
     poles = np.linalg.eigvals(inner).astype(complex) if inner.size else np.zeros(0, complex)
     poles = _resolve_eigenvalues(_sharpen_small(poles, inner), inner)
     poles, zeros = (values[np.lexsort((values.imag, values.real))] for values in (poles, zeros))
@@ -162,17 +173,22 @@ def transfer(
 def wide_transfer(
     one: Sequence[precise.Wide], other: Sequence[precise.Wide], place: tuple[int, int], improper: tuple[float, float]
 ) -> Transfer:
-    """The same of a, b [states], c [states], d in many digits; other: with the round-off of the rows changed.
+    """Zeros, poles and gain of one output by one input, of a, b [states], c [states], d in many digits; other: with the
+    round-off of the rows changed. Roots that move with it are at zero where they are small, and at infinity where they
+    are large.
 
     Roots that move with it are at zero where they are small, and at infinity where they are large.
     """
     zeros, poles, gain = precise.rational(*one)
     zeros2, poles2, _ = precise.rational(*other)
     fastest = float(np.abs(poles).max(initial=0.0))
+    # the same number of zeros in both: those that move with round-off are none
     if zeros.size == zeros2.size:
         loose = precise.relative_distances(zeros, zeros2) > precise.DETERMINED
+        # beyond all poles: at infinity, and a factor of the gain
         far = loose & (np.abs(zeros) > FAR * fastest)
         zeros, gain = np.where(loose & ~far, 0.0, zeros)[~far], gain * float(np.prod(-zeros[far]).real)
+    # poles that move with round-off are at zero
     if poles.size == poles2.size:
         poles = np.where(precise.relative_distances(poles, poles2) > precise.DETERMINED, 0.0, poles)
     poles, zeros = (values[np.lexsort((values.imag, values.real))] for values in (poles, zeros))
@@ -183,12 +199,15 @@ def reachable_part(a: Floats, b: Floats, c: Floats) -> tuple[Floats, Floats, Flo
     """a, b, c on the states that b reaches (Arnoldi's process, orthogonalised twice)."""
     size = float(np.linalg.norm(a, 2)) if a.size else 0.0
     basis: list[Floats] = []
+    # each direction is what a makes of the last, orthogonal to all so far
     following, least = b, 0.0
     while len(basis) < b.size:
+        # twice is enough (Kahan)
         for _ in range(2):
             for q in basis:
                 following = following - (q @ following) * q
         norm = float(np.linalg.norm(following))
+        # nothing is left but round-off: the space is closed
         if norm <= least:
             break
         basis.append(following / norm)
@@ -203,6 +222,7 @@ def _first_markov(a: Floats, b: Floats, c: Floats) -> tuple[int, float] | None:
     In the coordinates of the model, where zeros are zeros: those of `reachable_part` mix them with round-off.
     """
     row, size = c, np.abs(c)
+    # c a^r b for r = 0, 1, ...: the first that is neither zero nor the difference of large terms
     for r in range(b.size):
         markov = float(row @ b)
         faint = FAINT * float(np.abs(row).max() * np.abs(b).max())
@@ -214,12 +234,16 @@ def _first_markov(a: Floats, b: Floats, c: Floats) -> tuple[int, float] | None:
 
 def _zeros(a: Floats, b: Floats, c: Floats, d: float, first: tuple[int, float] | None) -> tuple[Complexes, float]:
     """Zeros and leading coefficient; none and 0 where nothing passes; first: of `_first_markov`."""
+    # no states: the direct part alone
     if not b.size:
         return np.zeros(0, complex), d
+    # a direct part: zeros of the inverse system
     if d != 0.0:
         return np.linalg.eigvals(a - np.outer(b, c) / d).astype(complex), d
+    # nothing passes at all
     if first is None or first[0] >= b.size:
         return np.zeros(0, complex), 0.0
+    # relative degree r + 1: rows c a^k that vanish along zero dynamics
     kept = [c]
     for _ in range(first[0]):
         kept.append(kept[-1] @ a)
@@ -229,8 +253,10 @@ def _zeros(a: Floats, b: Floats, c: Floats, d: float, first: tuple[int, float] |
 def _kept_at_zero(a: Floats, b: Floats, kept: Floats, markov: float) -> Complexes:
     """Eigenvalues of the motion that keeps the output at zero; kept [r, n]: c, c a, ..., c a^(r-1)."""
     size = np.linalg.norm(kept, axis=1)
+    # the null space of c, c a, ..., in which the motion stays
     _, _, vt = singular_decomposition(kept / size[:, None])
     basis = vt[len(kept) :].T
+    # the output fixes all states: no zeros
     if not basis.size:
         return np.zeros(0, complex)
     inner = a - np.outer(b, kept[-1] @ a) / markov
@@ -239,11 +265,13 @@ def _kept_at_zero(a: Floats, b: Floats, kept: Floats, markov: float) -> Complexe
 
 def _at_origin(a: Floats, b: Floats, c: Floats, d: float, zeros: Complexes) -> Complexes:
     """The zeros, those at s = 0 exactly: as many as moments d - c a^-1 b, -c a^-2 b, ... vanish."""
+    # without zeros, or with poles at the origin, moments do not exist
     if not zeros.size or not regular(a):
         return zeros
     inverse = np.linalg.inv(a)
     size, number = np.abs(c), 0
     row, direct = c @ inverse, d
+    # each moment that vanishes is one more zero at the origin
     while number < zeros.size:
         size = size @ np.abs(inverse)
         moment = direct - float(row @ b)
@@ -251,6 +279,7 @@ def _at_origin(a: Floats, b: Floats, c: Floats, d: float, zeros: Complexes) -> C
             break
         row, direct, number = row @ inverse, 0.0, number + 1
     found = zeros.copy()
+    # as many of the smallest zeros
     found[np.argsort(np.abs(zeros))[:number]] = 0.0
     return found
 

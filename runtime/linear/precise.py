@@ -70,7 +70,7 @@ def shaken(matrix: Floats, seed: int = 3) -> Floats:
 
 
 def wide(matrix: Floats) -> Wide:
-    """The same numbers as mpf."""
+    """The numbers of a matrix as mpf."""
     return np.array([mpmath.mpf(float(x)) for x in matrix.ravel()], dtype=object).reshape(matrix.shape)
 
 
@@ -89,14 +89,18 @@ def eliminate_consistent(matrix: Floats, aim: Wide) -> Wide | None:
 
 def _eliminate(full: Wide, n: int) -> Wide | None:
     """Gauss's elimination of [m, n + k]."""
+    # forward elimination, by the largest entry of the column
     for k in range(n):
         place = k + int(np.argmax(np.abs(full[k:, k]))) if full.shape[0] > k else k
+        # dependent columns, or fewer rows than unknowns
         if place >= full.shape[0] or abs(full[place, k]) < NOTHING:
             return None
         full[[k, place]] = full[[place, k]]
+        # rows that have zero there stay as they are
         below = np.flatnonzero(full[k + 1 :, k] != 0) + k + 1
         full[below, k:] -= (full[below, k] / full[k, k])[:, None] * full[k, k:]
     found = full[:n, n:].copy()
+    # back substitution
     for k in range(n - 1, -1, -1):
         found[k] = (found[k] - full[k, k + 1 : n] @ found[k + 1 :]) / full[k, k] if k + 1 < n else found[k] / full[k, k]
     return np.asarray(found)
@@ -105,6 +109,7 @@ def _eliminate(full: Wide, n: int) -> Wide | None:
 def solve(matrix: Wide, aim: Wide) -> Wide | None:
     """X [n, k] of matrix [n, n] X = aim [n, k]; None where the matrix is singular."""
     size = [max((abs(x) for x in row), default=0) for row in matrix]
+    # a row of zeros
     if not all(size):
         return None
     return _eliminate(np.hstack([matrix, aim]) / np.array(size, dtype=object)[:, None], matrix.shape[1])
@@ -117,21 +122,25 @@ def free(
     round-off changed, units [n]: of the unknowns.  Of columns in no group as few are free as can be, then of each
     group, the last one's first to be free.  What the change of round-off moves in its first digits is no pivot.
     """
+    # sparse rows of pairs: an entry, and the same entry with other round-off
     rows = {i: _pairs(one, other, units) for i, (one, other) in enumerate(zip(matrix, again, strict=True))}
     rest = np.setdiff1d(np.arange(matrix.shape[1]), np.concatenate(groups))
     left: list[int] = []
     used: list[int] = []
+    # the columns of no group are eliminated first, and so become dependent
     for group in (rest, *groups):
         members = {int(k) for k in group}
         while (found := _largest(rows, members)) is not None:
             place, column = found
             used.append(place)
+            # the row determines this column: out of all others
             pivots = rows.pop(place)
             pivot = pivots.pop(column)
             for row in rows.values():
                 if column in row:
                     _subtract_pairs(row, pivots, row.pop(column), pivot)
             members.remove(column)
+        # columns that no pivot was found for are free
         left += members
     return np.array(sorted(left), dtype=np.int64), np.array(sorted(used), dtype=np.int64)
 
@@ -150,6 +159,7 @@ def _largest(rows: dict[int, dict[int, Pair]], columns: set[int]) -> tuple[int, 
     best, found = 0.0, None
     for i, row in rows.items():
         inside = [j for j in row if j in columns]
+        # the largest entry in these columns over the largest of the row
         if inside:
             column = max(inside, key=lambda j: abs(row[j][0]))
             share = float(abs(row[column][0]) / max(abs(x[0]) for x in row.values()))
@@ -160,13 +170,16 @@ def _largest(rows: dict[int, dict[int, Pair]], columns: set[int]) -> tuple[int, 
 
 def _subtract_pairs(row: dict[int, Pair], pivots: dict[int, Pair], above: Pair, pivot: Pair) -> None:
     """Row := row - above/pivot pivots, without what round-off decides."""
+    # both entries of a pair are eliminated alike
     factor = above[0] / pivot[0], above[1] / pivot[1]
     none = mpmath.mpf(0), mpmath.mpf(0)
     for j, value in pivots.items():
         old = row.get(j, none)
         one, other = (old[k] - factor[k] * value[k] for k in (0, 1))
+        # agrees in its first digits: a number
         if abs(one - other) < UNCERTAIN * abs(one) and abs(one) > NOTHING * abs(old[0]):
             row[j] = one, other
+        # round-off alone: zero
         else:
             row.pop(j, None)
 
@@ -177,6 +190,7 @@ def subtract(row: dict[int, Any], pivots: dict[int, Any], factor: Any, nothing: 
         term = factor * value
         old = row.get(j, mpmath.mpf(0))
         new = old - term
+        # cancelled to nothing
         if abs(new) > nothing * max(abs(old), abs(term)):
             row[j] = new
         else:
@@ -191,10 +205,13 @@ def independent(columns: Wide, groups: tuple[NDArray[np.int64], ...]) -> NDArray
     size = np.array([max((abs(x) for x in row), default=0) for row in left], dtype=object)
     kept: list[int] = []
     for group in groups:
+        # as many from the first group as are independent
         first = len(kept)
+        # rows of zeros depend on everything
         members = [int(k) for k in group if size[k] > 0]
         while members and len(kept) < left.shape[1]:
             share = [max(abs(x) for x in left[k]) / size[k] for k in members]
+            # nothing independent is left in the group
             if max(share) < DEPENDENT:
                 break
             row = members.pop(int(np.argmax(share)))
@@ -211,10 +228,12 @@ def decompose(matrix: Wide) -> Decomposed:
     """Eigenvalues and eigenvectors in DIGITS, those below ZERO of the largest entry zero."""
     with digits():
         try:
+            # eigenvectors of both sides, for participation
             found, left, right = mpmath.mp.eig(mpmath.matrix(matrix.tolist()), left=True, right=True)
         except RuntimeError:  # its iteration gives up on a few matrices; what is lost in doubles is refused later
             values_, vectors = np.linalg.eig(narrow(matrix))
             return Decomposed(values_.astype(complex), vectors.astype(complex), np.linalg.pinv(vectors).astype(complex))
+        # eigenvalues that are round-off of the largest entry
         largest = max((abs(x) for x in matrix.ravel()), default=mpmath.mpf(0))
         values = [_round_eigenvalue(mpmath.mpc(v)) if abs(v) > ZERO * largest else 0j for v in found]
         return Decomposed(
@@ -234,6 +253,7 @@ def relative_distances(one: Values, other: Values) -> NDArray[np.float64]:
     """Relative distance of each value [n] to its partner in another set of as many, nearest first."""
     left = list(range(other.size))
     found = np.zeros(one.size)
+    # the largest first: each takes the nearest that is left
     for k in np.argsort(-np.abs(one)):
         near = min(left, key=lambda j: abs(other[j] - one[k]))
         left.remove(near)
@@ -253,8 +273,10 @@ def steady(values: Values, again: Values) -> bool:
 
 def refuse_lost(values: Values, again: Values, refuse: Callable[[complex], Exception]) -> None:
     """Raises refuse(value) of an eigenvalue in double precision that moves with round-off and is none."""
+    # of different numbers nothing agrees
     away = relative_distances(values, again) if values.size == again.size else np.ones(values.size)
     least = 1e-10 * float(np.abs(values).max(initial=0.0))
+    # neither zero, nor near the fast ones: an eigenvalue of its own, and lost
     slow = np.flatnonzero((away > LOST) & (np.abs(values) > least) & (np.abs(values) < CROWDED * least))
     if slow.size:
         raise refuse(complex(values[slow[0]]))
@@ -262,10 +284,13 @@ def refuse_lost(values: Values, again: Values, refuse: Callable[[complex], Excep
 
 def settle_modes(found: Decomposed, again: Values, refuse: Callable[[complex], Exception]) -> Decomposed:
     """The modes, zero where an eigenvalue is round-off of the largest; raises refuse(value) of one that is neither."""
+    # those that move with round-off
     moved = np.flatnonzero(relative_distances(found.values, again) > DETERMINED)
     values = found.values.copy()
+    # k of them are zero to the k-th root of round-off (a Jordan block)
     least = ROUND_OFF ** (1.0 / max(moved.size, 1)) * float(np.abs(values).max(initial=0.0))
     for k in moved:
+        # too large for a zero
         if not abs(values[k]) <= least:
             raise refuse(complex(values[k]))
         values[k] = 0.0
@@ -281,19 +306,24 @@ def rational(a: Wide, b: Wide, c: Wide, d: Any) -> tuple[Values, Values, float]:
     """Zeros, poles and leading coefficient of c (s - a)^-1 b + d, without what cancels (Leverrier and Faddeev)."""
     with digits():
         n, above, below, power = b.size, [], [mpmath.mpf(1)], wide(np.eye(b.size))
+        # coefficients of the characteristic polynomial and of c adj(s - a) b
         for k in range(1, n + 1):
             above.append(c @ power @ b)
             power = a @ power
             below.append(-sum(power.diagonal()) / k)
             power = power + below[-1] * wide(np.eye(n))
+        # numerator: d times the denominator, and what states add
         top = [d * x for x in below]
         top = [top[0], *(x + y for x, y in zip(top[1:], above, strict=True))]
         largest = max((abs(x) for x in top), default=mpmath.mpf(0))
+        # leading coefficients that are zero: the relative degree
         while top and abs(top[0]) <= ZERO * largest:
             top = top[1:]
+        # nothing passes
         if not top:
             return np.zeros(0, complex), np.zeros(0, complex), 0.0
         zeros, poles = _roots(top), _roots(below)
+        # a zero at a pole cancels: what is not reachable, or not seen
         for zero in list(zeros):
             near = min(poles, key=lambda p: abs(p - zero), default=None)
             if near is not None and abs(near - zero) <= CANCELS * max(abs(near), abs(zero)):
@@ -306,6 +336,7 @@ def _roots(coefficients: list[Any]) -> list[Any]:
     """Roots of a polynomial, highest power first; zero where its last coefficients are."""
     largest = max(abs(x) for x in coefficients)
     last = len(coefficients)
+    # last coefficients that are zero: roots at zero
     while last > 1 and abs(coefficients[last - 1]) <= ZERO**2 * largest:
         last -= 1
     none = [mpmath.mpf(0)] * (len(coefficients) - last)

@@ -64,6 +64,7 @@ def at_frequencies(transfer: Transfer, s: Complexes) -> Complexes:
     value = np.full(s.shape, complex(transfer.gain))
     zeros, poles = list(transfer.zeros), list(transfer.poles)
     with np.errstate(divide="ignore", invalid="ignore"):
+        # one zero over one pole after the other
         for k in range(max(len(zeros), len(poles))):
             value = value * (s - zeros[k] if k < len(zeros) else 1.0)
             value = value / (s - poles[k] if k < len(poles) else 1.0)
@@ -73,6 +74,7 @@ def at_frequencies(transfer: Transfer, s: Complexes) -> Complexes:
 def span(transfers: Iterable[Transfer]) -> tuple[float, float]:
     """Frequencies between which something happens, rad/s."""
     corners = [abs(c) for t in transfers for c in (*t.poles, *t.zeros) if abs(c) > 0.0]
+    # neither poles nor zeros: any decade serves
     if not corners:
         return 0.1, 10.0
     return min(corners) / DECADE, max(corners) * DECADE
@@ -80,7 +82,9 @@ def span(transfers: Iterable[Transfer]) -> tuple[float, float]:
 
 def frequencies(transfer: Transfer, low: float, high: float, points: int = POINTS) -> Frequencies:
     """G along the imaginary axis; resonances between the points are not missed: their corners are points too."""
+    # at corner frequencies the slope changes
     corners = [abs(c) for c in (*transfer.poles, *transfer.zeros) if low < abs(c) < high]
+    # about a resonance as many points as its width needs
     near = [
         abs(p.imag) * (1.0 + k * max(abs(p.real / p.imag), 1e-9))
         for p in transfer.poles
@@ -88,6 +92,7 @@ def frequencies(transfer: Transfer, low: float, high: float, points: int = POINT
         for k in (-2.0, -1.0, -0.5, 0.0, 0.5, 1.0, 2.0)
     ]
     found = np.unique([*np.geomspace(low, high, points), *corners, *(w for w in near if low < w < high)])
+    # on an undamped pole G is infinite
     on = [abs(p.imag) for p in transfer.poles if p.real == 0.0]
     w = np.array([x for x in found if x not in on])
     return Frequencies(w, at_frequencies(transfer, 1j * w))
@@ -101,14 +106,18 @@ def margins(transfer: Transfer, low: float, high: float) -> Margins:
     g = found.value
 
     def roots(values: Floats, function: object) -> list[float]:
+        # where a sign changes between two points
         places = np.flatnonzero((values[:-1] < 0.0) != (values[1:] < 0.0))
         return [float(brentq(function, found.w[k], found.w[k + 1], xtol=1e-300, rtol=1e-13)) for k in places]
 
     def one(w: float) -> complex:
         return complex(at_frequencies(transfer, np.array([1j * w]))[0])
 
+    # G is real and negative: the phase is -180 degrees
     real = [w for w in roots(g.imag, lambda w: one(w).imag) if one(w).real < 0.0 and np.isfinite(one(w))]
+    # |G| = 1: the gain is one
     even = roots(np.abs(g) - 1.0, lambda w: abs(one(w)) - 1.0)
+    # of several crossings that nearest to |G| = 1, and to -180 degrees
     w_phase = min(real, key=lambda w: abs(np.log(abs(one(w)))), default=None)
     turned = {w: (float(np.degrees(np.angle(one(w)))) + 360.0) % 360.0 - 180.0 for w in even}
     w_gain = min(turned, key=lambda w: abs(turned[w]), default=None)
@@ -119,9 +128,12 @@ def margins(transfer: Transfer, low: float, high: float) -> Margins:
 def horizon(transfers: Iterable[Transfer]) -> float:
     """Seconds after which step responses have settled, or have turned TURNS times."""
     longest = 0.0
+    # poles at the origin never settle
     for p in (p for t in transfers for p in t.poles if abs(p) > 0.0):
+        # undamped: as many turns as are shown
         decays = DECAYS / abs(p.real) if abs(p.real) > 1e-9 * abs(p) else np.inf
         turns = TURNS * 2.0 * np.pi / abs(p)
+        # an unstable pole is shown for half as long
         longest = max(longest, min(decays, turns) if p.real <= 0.0 or np.isinf(decays) else min(decays / 2.0, turns))
     return longest or 1.0
 
@@ -133,6 +145,7 @@ def step(small: Reduced, transfer: Transfer, end: float, points: int = TIMES) ->
     time = np.linspace(0.0, end, points)
     j, i = transfer.input, transfer.output
     n = small.a.shape[0]
+    # the input as a state that stays at 1: one exponential for every step
     wide = np.zeros((n + 1, n + 1))
     wide[:n, :n], wide[:n, n] = small.a, small.b[:, j]
     one = np.asarray(expm(wide * (time[1] - time[0])))
@@ -151,13 +164,16 @@ def branches(sets: list[Complexes]) -> NDArray[np.complex128]:
     n = max((s.size for s in sets), default=0)
     found = np.full((len(sets), n), np.nan + 0j)
     for k, values in enumerate(sets):
+        # the first set, or one after a gap
         if k == 0 or not np.isfinite(found[k - 1]).any():
             found[k, : values.size] = values
             continue
         last = found[k - 1]
+        # aim: where the curve goes on to, by its last two points
         ahead = last + (last - found[k - 2]) if k > 1 else last
         aim = np.where(np.isfinite(ahead), ahead, last)
         cost = np.abs(np.where(np.isfinite(aim), aim, 0.0)[:, None] - values[None, :])
+        # a curve without a past is matched last
         cost[~np.isfinite(aim)] = cost.max(initial=0.0) * 2.0 + 1.0
         rows, columns = linear_sum_assignment(cost)
         found[k, rows] = values[columns]

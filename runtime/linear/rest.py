@@ -88,11 +88,13 @@ class Resting:
         self.starter, self.share = Starter(system), SHARE
         self.rows = system.another("rated")
         self.n = system.form.written
+        # flows of what is tangible stand still; those of cyclic coordinates may not
         families = system.description.families
         owners = np.array([families[int(k)].owner in tangible for k in system.family_of[: self.n]], dtype=bool)
         self.still = (system.kinds[: self.n] == "f") & owners
         self.loose = quadratures(system, tangible)
         self.use = self._use()
+        # angles may be found whole turns away
         self.turns = np.array([families[int(k)].unit == "rad" for k in system.family_of[: self.n]], dtype=bool)
         self.turns &= system.kinds[: self.n] == "q"
         self.along = self._together()
@@ -104,15 +106,19 @@ class Resting:
         """
         flows = np.flatnonzero(self.still)
         at = dict(zip(self.system.form.k_f.tolist(), self.system.form.k_q.tolist(), strict=True))
+        # a large model, or flows without displacements: no search for such directions
         if not flows.size or self.n > DENSE or any(int(k) not in at for k in flows):
             return np.zeros((flows.size, 0))
         places = np.array([at[int(k)] for k in flows])
         random = np.random.default_rng(11)
+        # constant along the directions at three points: constant everywhere, but for chance
         points = [self.first, *(self.first + self._spread() * random.standard_normal(self.n) for _ in range(2))]
         with np.errstate(all="ignore"):
             matrices = [self.rows.dense(self.jacobian(y)) for y in points]
+        # beyond the domain of a law
         if not all(np.isfinite(m).all() for m in matrices):
             return np.zeros((flows.size, 0))
+        # linear displacement constraints may move, for their rates stand in rows of their own
         linear = np.all([(m == matrices[0]).all(axis=1) for m in matrices], axis=0) & self.rows.of_groups("phi")
         stacked = np.vstack([m[self.use & ~linear][:, places] for m in matrices])
         row, _ = factors(stacked)
@@ -126,8 +132,10 @@ class Resting:
     def _use(self) -> Mask:
         """Rows of rest: as written, the rates of displacement constraints, multipliers of what does not hold."""
         use = self.rows.of_groups("dynamics", "momentum", "phi", "phi_rate", "psi", "gamma", "lambda").copy()
+        # rows of what does not hold say that multipliers vanish
         use[self.rows.held[0]] = True
         grows = self.loose & (self.system.kinds[: self.n] == "s")
+        # a dynamic variable that nothing reads may grow: its row is no condition
         for group, family, first in self.rows.form.groups:
             if group == "lambda":
                 owner = self.system.description.rows[family].owner
@@ -166,12 +174,15 @@ class Resting:
 
     def problem(self, guess: Floats) -> Problem:
         """Rest nearest to a guess."""
+        # magnitudes of the guess
         x = self.starter.unknowns(self.t, guess, np.zeros(self.n))
         scale = self.starter.scale(self.t, x)[: self.n]
+        # multipliers and implicit efforts follow: they hardly weigh
         follows = np.isin(self.system.kinds[: self.n], ("kappa", "mu", "e"))
         pattern = self.rows.pattern
         rows, columns = pattern.row.astype(np.int64), pattern.columns_of().astype(np.int64)
         use, free = self.use, ~self.still
+        # flows along which all moves together are unknown; the rest of them stays
         if self.along.size:
             flows = np.flatnonzero(self.still)
             rows = np.concatenate([rows, self.rows.rows + np.repeat(np.arange(flows.size), flows.size)])
@@ -197,9 +208,11 @@ class Resting:
         """
         near = self.first if near is None else near
         guess = guess.copy()
+        # of the guess's flows what all rows allow
         guess[self.still] = self.along @ (self.along.T @ guess[self.still])
         problem = self.problem(guess)
         best = solve(problem, guess)
+        # Newton's method came to no solution
         if not best.residual < MET:
             return None
         y = self._wrap_angles(self._clean(best.x, problem))
@@ -208,10 +221,12 @@ class Resting:
         if not own.residual < MET:
             return None
         y = self._clean(own.x, problem)
+        # directions that the rows leave open, and the unknowns that stand in these
         null = self._null(y, again) / again.scale[:, None] if self.n <= DENSE else np.zeros((self.n, 0))
         told = ~np.isin(self.system.kinds[: self.n], ("kappa", "mu"))
         open_ = told & (np.abs(null).max(axis=1, initial=0.0) > SAME)
         y = self._back(y, again, null, open_, near)
+        # a root at the edge of floating point is none
         if (np.abs(y) > FAR * problem.scale).any():  # rows hold beside terms that large alone
             return None
         state = ConsistentState(self.t, y, self.rates(y), (), own.residual)
@@ -220,8 +235,10 @@ class Resting:
 
     def _is_rest(self, y: Floats) -> bool:
         """Whether y is a state of rest, but for what is near zero in its magnitude."""
+        # one iteration at most: y is a root, or hardly moves
         problem = self.problem(y)
         found = solve(replace(problem, guess=y), y, 1)
+        # what counts as nothing: by its like, by what is observed, by noise
         noise = NEAR * group_maximum(self.system, problem.scale), self._nothing, NOISE * self._alike(y)
         told = ~np.isin(self.system.kinds[: self.n], ("kappa", "mu"))
         return found.residual < MET and bool((np.abs(found.x - y) <= np.maximum.reduce(noise))[told].all())
@@ -251,14 +268,18 @@ class Resting:
 
     def _back(self, y: Floats, problem: Problem, null: Floats, open_: Mask, near: Floats) -> Floats:
         """What the rows leave open as it is in `near`; open_: which of what has a magnitude that is."""
+        # of a large model no null space
         if self.n > DENSE:  # what nothing depends on is known without
             back = np.where(self.loose, near, y)
             return back if (back != y).any() and self._is_rest(back) else y
+        # the rows determine everything
         if not open_.any():
             return y
+        # back along the null space, as near as it leads
         away = (y - near) / problem.scale
         moves = open_ | np.isin(self.system.kinds[: self.n], ("kappa", "mu"))
         back = np.where(moves, y - problem.scale * (null @ least_squares(null, away)), y)
+        # straight: the rows hold there
         if self._is_rest(back):
             return back
         found = solve(self.problem(back), back)  # along what bends, or from where its rows hold by round-off alone
@@ -267,17 +288,20 @@ class Resting:
     def _wrap_angles(self, y: Floats) -> Floats:
         """Angles in -pi..pi where the rows cannot tell whole turns; -pi but for round-off is pi."""
         turned = np.where(self.turns, np.pi + SAME - np.mod(np.pi + SAME - y, 2.0 * np.pi), y)
+        # an angle that the rows tell apart stays where it was
         near = solve(replace(self.problem(turned), guess=turned), turned, 3)
         return near.x if near.residual < MET else y
 
     def _null(self, y: Floats, problem: Problem) -> Floats:
         """Directions along which the rows of rest do not change [unknowns, k]."""
         full = self.rows.dense(self.jacobian(y))[self.use]
+        # flows that move together are unknowns too
         if self.along.size:
             held = np.zeros((self.along.shape[0], self.n))
             held[:, self.still] = self._held
             full = np.vstack([full, held])
         full = full[:, problem.free]
+        # equilibrated: ranks do not depend on units
         row, column = factors(full)
         null = null_space(row[:, None] * full * column)
         found = np.zeros((self.n, null.shape[1]))
@@ -288,10 +312,12 @@ class Resting:
         """Whether the rows at a point are those of the first guess: of one straight piece, from which Newton's method
         leads to where it led from there.
         """
+        # the slopes differ: another piece of some law
         values = self._slopes(self.first)
         if not np.array_equal(values, self._slopes(point)):
             return False
         problem, away = self.problem(self.first), point - self.first
+        # by the tangent from the first guess: residuals beyond round-off mean a curve
         tangent, terms = self.residual(self.first), np.zeros(problem.number)
         add_product(problem.rows, problem.columns, values, away, tangent)
         add_sizes(problem.rows, problem.columns, values, np.abs(self.first) + np.abs(away), terms)
@@ -304,9 +330,11 @@ class Resting:
         told = ~np.isin(self.system.kinds[: self.n], ("kappa", "mu")) & ~self.loose
         size = self._sizes(one.state.y, other.state.y)
         move = ((other.state.y - one.state.y) / size)[told]
+        # movement along what the first leaves open is no difference
         if one.free:
             null = (self._null(one.state.y, problem) / size[:, None])[told]
             move = move - null @ least_squares(null, move)
+        # both open: they may be points of one family
         differ = bool(np.abs(move).max(initial=0.0) > SAME)
         return differ and not (one.free and other.free and self._between(one.state.y, other.state.y, told))
 
@@ -314,22 +342,27 @@ class Resting:
         """Whether states of rest lead from one to another: by steps along what they leave open, and back onto them."""
         y, turned, piece = one, False, PIECE
         size = self._sizes(one, other)
+        # in steps along the null space
         for _ in range(PIECES):
             away = ((other - y) / size)[told]
+            # arrived
             if np.abs(away).max(initial=0.0) <= SAME:
                 return True
             null = self._null(y, self.problem(y)) / size[:, None]
             along = null @ least_squares(null[told], away) if null.size else np.zeros(y.size)
             longest = float(np.abs(along).max())
+            # at a turning point, or apart
             if longest < SAME:  # nothing leads nearer: a way around, once
                 if turned or not null.size:
                     return False
                 turned, along = True, null[:, 0]
                 longest = float(np.abs(along).max())
             begun = y + size * along * min(1.0, piece / longest)
+            # back onto the rows; a step that leads far away was too long
             found = solve(replace(self.problem(begun), guess=begun), begun)
             follows = found.residual < MET and np.abs((found.x - begun) / size)[told].max() <= piece
             y, piece = (found.x, min(2.0 * piece, PIECE)) if follows else (y, 0.25 * piece)
+            # hardly moves any more: apart
             if piece < SHORTEST:
                 return False
         return False
@@ -368,20 +401,26 @@ def rests(
     guess, begun = resting.first, False
     random = np.random.default_rng(7)
     scale = resting.problem(guess).scale
+    # angles spread over whole turns even where the guess is small
     scale = np.where(resting.turns, np.maximum(scale, 1.0), scale)
     mirrored: list[Floats] = []  # springs and pendulums are often symmetrical
+    # large models: the first guess alone
     for k in range(tries + 1 if guess.size <= MANY else 1):
         if most is not None and len(kept) >= most:
             break
         if advance is not None:
             advance(k)
+        # from next to the guess to far away, in decades
         shaken = 10.0 ** random.uniform(NEAREST, FARTHEST) * scale * random.standard_normal(guess.size)
         point = guess if k == 0 else mirrored.pop() if mirrored else guess + shaken
+        # on the same straight piece Newton's method leads to the same state
         if begun and resting.alike(point):
             continue
+        # while nothing is found more work is allowed
         resting.share = 1.0 if k < SOUGHT and not kept else SHARE
         found = resting.found(point)
         begun = begun or (k == 0 and found is not None)
+        # one of its own, not of a family found before
         if found is not None and all(resting.is_apart(other, found) for other in kept):
             kept.append(found)
             mirrored.append(-found.state.y)

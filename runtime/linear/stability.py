@@ -54,20 +54,27 @@ def verdict(small: Reduced, loose: NDArray[np.bool_], energy: Energy | None, tog
     """What both methods say together; loose [unknowns]: what nothing depends on; together: directions in which
     displacements move without changing anything: so many eigenvalues at zero say nothing.
     """
+    # states that something depends on
     felt = np.flatnonzero((small.places >= 0) & ~loose[small.places])
     values = np.linalg.eigvals(balance_matrix(small.a[np.ix_(felt, felt)])[0]) if felt.size else np.zeros(0)
     near = STILL * float(np.abs(values).max(initial=0.0))
+    # as many eigenvalues at zero as directions move freely say nothing
     values = values[np.argsort(np.abs(values))]
     values = values[min(together, int((np.abs(values) <= near).sum())) :]
     found = modes(small.a, small.decomposed)
+    # Lyapunov: one in the right half plane
     if (values.real > near).any():
         return Verdict("unstable", "linearisation", found, energy)
+    # all in the left half plane
     if (values.real < -near).all():
         return Verdict("asymptotically stable", "linearisation", found, energy)
+    # eigenvalues on the axis: the potential decides (Lagrange, Dirichlet)
     if energy is not None and energy.kind == "minimum":
         return Verdict("stable", "energy", found, energy)
+    # no minimum and nothing dissipates: unstable (Chetayev)
     if energy is not None and energy.kind in ("maximum", "saddle") and energy.conservative:
         return Verdict("unstable", "energy", found, energy)
+    # on the axis, and the energy says nothing
     return Verdict("undecided", "linearisation", found, energy)
 
 
@@ -75,25 +82,32 @@ def energy_at(system: System, state: ConsistentState) -> Energy | None:
     """The energy test at a state of rest; None where it says nothing: steady motion, efforts that effort constraints or
     dynamic variables give, or that have no potential.  system: the form as written of a primal formulation.
     """
+    # steady motion: the potential of rest does not apply
     if np.abs(state.y[system.kinds[: state.y.size] == "f"]).any():
         return None
     settled = system.another("settled")
     jy, _ = settled.jacobian(state.t, state.y, state.yd)
     full = settled.dense(jy)
     flows, places, balances = _coordinates(settled)
+    # efforts from constraints or dynamic variables have no potential
     if full[np.ix_(balances, np.flatnonzero(np.isin(settled.kinds, ("e", "s"))))].any():
         return None
+    # stiffness and damping by displacements and flows of the coordinates
     stiff = np.where(places >= 0, full[np.ix_(balances, np.maximum(places, 0))], 0.0)
     loss = full[np.ix_(balances, flows)]
     bound = _bound(settled, full, flows, places)
+    # virtual displacements: what the constraints leave free
     free = null_space(equilibrate(bound)[0]) if bound.size else np.eye(flows.size)
     stiff, loss = (free.T @ part @ free for part in (stiff, loss))
+    # the constraints hold everything
     if not stiff.size:
         return None
     size = float(np.abs(stiff).max())
+    # gyroscopic or circulatory: damping that is not symmetric
     turning = float(np.abs(loss - loss.T).max()) > FLAT * max(float(np.abs(loss).max()), 1e-300)
     worst = float(np.linalg.eigvalsh((loss + loss.T) / 2.0).min())
     active = worst < -FLAT * float(np.abs(loss).max())
+    # no potential, or energy that something brings in
     if not np.isfinite(stiff).all() or np.abs(stiff - stiff.T).max() > FLAT * size or active:
         return None
     values: Floats = np.asarray(np.linalg.eigvalsh((stiff + stiff.T) / 2.0), dtype=np.float64)
@@ -101,6 +115,7 @@ def energy_at(system: System, state: ConsistentState) -> Energy | None:
 
 
 def _kind(values: Floats) -> str:
+    # all above, all below, both, or none but round-off
     near = FLAT * float(np.abs(values).max(initial=0.0))
     if (values > near).all():
         return "minimum"
@@ -119,10 +134,12 @@ def _coordinates(settled: System) -> tuple[Floats, Floats, Floats]:
     places: list[NDArray[np.integer]] = [nothing]
     rows: list[NDArray[np.integer]] = [nothing]
     for k, family in enumerate(families):
+        # coordinates have flows; displacements some of them
         if family.kind != "f":
             continue
         here = np.arange(family.size)
         flows.append(form.at[k] + here)
+        # a coordinate without displacement: its place is -1
         own = displacement.get(family.owner)
         places.append(own + here if own is not None else np.full(family.size, -1))
         rows.append(first[family.owner] + here)
@@ -131,12 +148,14 @@ def _coordinates(settled: System) -> tuple[Floats, Floats, Floats]:
 
 def _bound(settled: System, full: Floats, flows: Floats, places: Floats) -> Floats:
     """[Phi_q; Psi_f] of the constraints that hold."""
+    # constraints that do not hold now bind nothing
     idle = set(settled.idle_multipliers().tolist())
     parts = []
     for group, k, row in settled.form.groups:
         size = settled.description.rows[k].size
         if group not in ("phi", "psi"):
             continue
+        # by displacements for phi, by flows for psi
         block = full[row : row + size]
         part = np.where(places >= 0, block[:, np.maximum(places, 0)], 0.0) if group == "phi" else block[:, flows]
         parts.append(part[[r for r in range(size) if _multiplier(settled, k, r) not in idle]])
@@ -145,6 +164,7 @@ def _bound(settled: System, full: Floats, flows: Floats, places: Floats) -> Floa
 
 def _multiplier(settled: System, row: int, position: int) -> int:
     """Place of the multiplier of a constraint's row."""
+    # phi has kappa, psi has mu
     own = settled.description.rows[row]
     kind = "kappa" if own.block == "phi" else "mu"
     families = settled.description.families

@@ -22,11 +22,13 @@ OWN = 10.0
 
 def candidates_of(system: System, state: ConsistentState, n: int) -> NDArray[np.int64]:
     """Places of y that may be states: displacements, momenta, dynamic variables, flows with inertia and no momentum."""
+    # unknowns whose rate occurs, and displacements
     _, jyd = system.jacobian(state.t, state.y, state.yd)
     moving = system.differential(jyd)[:n]
     moving[system.form.k_q] = True
     kinds = system.kinds[:n]
     families = system.description.families
+    # a flow is a state where its coordinate has no momentum
     carried = {f.owner for f in families if f.kind == "p"}
     bare = np.array([families[int(k)].owner not in carried for k in system.family_of[:n]], dtype=bool)
     return np.flatnonzero(moving & (np.isin(kinds, ("q", "p", "s")) | ((kinds == "f") & bare)))
@@ -40,15 +42,19 @@ def chosen_states(
     that which moves most.
     """
     n = system.form.written
+    # how far each moves beside its like
     size = np.linalg.norm(tangent[:n], axis=1) * units[:n]
     most = group_maximum(system, size)
     weight = np.where(most > 0.0, size / np.where(most > 0.0, most, 1.0), 0.0)[:, None]
     shown = system.kinds[candidates] == "q"
     kept: list[int] = []
+    # displacements, then other states, then what nothing depends on
     for group in (shown & ~loose[candidates], ~shown & ~loose[candidates], loose[candidates]):
         members = candidates[group]
+        # directions that the states so far do not see
         left = tangent @ unseen(tangent[kept])
         coordinates = {_coordinate(system, k) for k in kept}
+        # a flow beside its own displacement is preferred
         near = np.array([OWN if _coordinate(system, int(k)) in coordinates else 1.0 for k in members])
         part = left[members] * near[:, None] * weight[members]
         kept += members[pivots(part, rank_of(left[members]))].tolist() if part.size else []
@@ -70,6 +76,7 @@ def rank_of(part: Floats) -> int:
 
 def unseen(rows: Floats) -> Floats:
     """Directions that some rows of orthonormal columns do not see."""
+    # no rows see nothing: all directions
     if not rows.size:
         return np.eye(rows.shape[1])
     _, sigma, vt = singular_decomposition(rows)
@@ -88,7 +95,9 @@ def quadratures(system: System, tangible: AbstractSet[str]) -> Mask:
     """
     settled = system.another("settled")
     n = system.form.written
+    # unknowns that stand in rows of the settled form
     columns = settled.pattern.columns_of()[settled.structural()[0]]
+    # read without slope: sign(x), step(x)
     read = np.isin(settled.family_of, list(_read_flat(settled)))
     read[columns] = True
     families, kinds = system.description.families, system.kinds[:n]
@@ -113,6 +122,7 @@ def moving(system: System, state: ConsistentState) -> bool:
 
 def constant(system: System, state: ConsistentState) -> bool:
     """Whether the pencil is the same beside the state: linear equations, whose frozen pencil is right in motion too."""
+    # any other point: linear equations have the same slopes there
     random = np.random.default_rng(5)
     here = system.jacobian(state.t, state.y, state.yd)
     y, yd = (v + np.maximum(np.abs(v), 1.0) * random.uniform(0.1, 0.3, v.size) for v in (state.y, state.yd))

@@ -143,13 +143,16 @@ def rows_at(system: System, state: ConsistentState) -> Rows:
     """Every row that holds at consistent states, linearised; system: the form as written."""
     starter = Starter(system)
     x = starter.unknowns(state.t, state.y, state.yd)
+    # dense matrices beyond this fill the memory
     if max(x.size, starter.settled.rows) > LARGEST:
         text = f"{x.size} unknowns and rates are more than {LARGEST}, up to which full matrices are taken"
         raise NoLinearisation(text)
+    # all rows that starts meet, hidden constraints among them
     full = np.zeros((starter.settled.rows, x.size))
     np.add.at(full, (starter.rows, starter.columns), starter.jacobian(state.t, x))
     if not np.isfinite(full).all():
         raise NoLinearisation("the slopes of the equations are no numbers there")
+    # rates of displacements are flows: no unknowns of their own
     as_written = np.delete(full, np.s_[system.form.written : starter.n], axis=1)
     return Rows(starter, as_written, starter.every & ~starter.groups("initial"))
 
@@ -161,8 +164,10 @@ def _tangent(g: Floats, by_column: Floats) -> tuple[Floats, Floats]:
     Where a farad counts in millionths, charges would pass for at rest beside voltages; the flow of a source, which no
     stiff law weighs, would hide the balance of all others at its node.
     """
+    # rows of zeros stay zeros
     by_row = 1.0 / np.where(g.any(axis=1), np.abs(g * by_column).max(axis=1, initial=0.0), 1.0)
     tangent = _null_space(by_row[:, None] * g * by_column)
+    # units in which what moves moves alike, by iteration
     for _ in range(PASSES):
         size = np.linalg.norm(tangent, axis=1)
         by_column = _no_heavier(g, by_column * np.where(size > MOVES, size, 1.0), size > MOVES)
@@ -181,6 +186,7 @@ def _no_heavier(g: Floats, units: Floats, moves: Mask) -> Floats:
 
 def _null_space(matrix: Floats) -> Floats:
     """Orthonormal columns that a matrix maps to zero, to round-off: a fast mode is no constraint."""
+    # many rows: a triangular factor with pivots, where its rank is sure
     sure = sure_complement(matrix, CERTAIN) if matrix.shape[0] > FEW else None
     if sure is not None:
         return sure
@@ -190,47 +196,58 @@ def _null_space(matrix: Floats) -> Floats:
 
 def reduce(given: Given) -> Reduced:
     """The reduction.  Raises NoLinearisation."""
+    # rows that hold at consistent states: G dz = 0
     rows, system, loose = given.rows, given.system, given.loose
     starter, n = rows.starter, system.form.written
     g = rows.jacobian[rows.holds]
     tangent, moves = _tangent(g, factors(g)[1])
     candidates = candidates_of(system, given.state, n)
+    # which unknowns serve as states
     part = tangent[candidates]
     rank = rank_of(part)
     chosen = chosen_states(system, tangent, moves, candidates, loose)
     rates = _rates(starter, system, chosen)
     _refuse_undetermined(system, tangent, part, chosen, rates, rank)
+    # right sides: one column a state, then inputs and their rates
     right = np.zeros((g.shape[0], chosen.size + ORDERS * len(given.names)))
     right[:, chosen.size :] = given.right(np.arange(g.shape[0]))
 
     def make(moved: NDArray[Any], noise: float = NOISE) -> Reduced:
         return _without_rates_of_inputs(given, moved, rates, chosen, noise)
 
+    # once as given, once with other round-off
     small = make(_variations(g, right, chosen, moves))
     again = precise.shaken(g)
     values, others = (np.linalg.eigvals(part) for part in (small.a, make(_variations(again, right, chosen, moves)).a))
+    # double precision holds all modes but zeros
     if precise.steady(values[values != 0.0], others[others != 0.0]):
+        # else many digits, where states are few
         return small
     if (
         small.names
         and (found := _reduce_precisely(len(small.names), make, (g, again, right, chosen, moves))) is not None
     ):
         return found
+    # neither: handed on with what differs
     return replace(small, unsure=make(_variations(again, right, chosen, moves), NOISE).a)
 
 
 def widely_reduced(given: Given) -> Reduced | None:
-    """The same with the states chosen in many digits too; None where it is too large or round-off decides their number.
+    """The reduction with the states chosen in many digits too; None where it is too large or round-off decides their
+    number.
 
     Raises NoLinearisation.
     """
+    # as in `reduce`, with the choice in many digits too
     rows, system, loose = given.rows, given.system, given.loose
     starter = rows.starter
     g = rows.jacobian[rows.holds]
+    # too many columns
     if g.shape[1] > WIDEST:
         return None
     known = candidates_of(system, given.state, system.form.written)
     shown = system.kinds[known] == "q"
+    # the last group is free first: displacements
     groups = (known[loose[known]], known[~shown & ~loose[known]], known[shown & ~loose[known]])
     units = factors(g)[1]
     again = precise.shaken(g)
@@ -238,6 +255,7 @@ def widely_reduced(given: Given) -> Reduced | None:
         left, used = precise.free(g, again, units, groups)
     states = np.isin(left, known)
     chosen, held = left[states], left[~states]
+    # rates that move with something that is no state
     if _follow(g[used], left, states, units, _rates(starter, system, chosen)):
         return None
     # what the rows leave open beside the states (redundant multipliers) is held
@@ -256,12 +274,15 @@ def widely_reduced(given: Given) -> Reduced | None:
 
 def _follow(g: Floats, left: NDArray[np.int64], states: Mask, units: Floats, rates: NDArray[np.int64]) -> bool:
     """Whether the rates of states [k] move with what is free [left] and no state: constraints are hidden deeper."""
+    # nothing but states is free
     if states.all():
         return False
     with precise.digits():
         found = _moved_widely(g, np.zeros((g.shape[0], left.size)), left, units)
+    # the rows leave something open
     if found is None:
         return True
+    # rates by what is free and no state, in units of both
     moved = np.abs(precise.narrow(found)[rates][:, ~states]) * units[left[~states]] / units[rates][:, None]
     return bool((moved > TOLERANCE).any())
 
@@ -273,12 +294,15 @@ def _reduce_precisely(
 ) -> Reduced | None:
     """The reduction in many digits, where its states are few and the rows determine all."""
     g, again, right, chosen, moves = given
+    # none, or too many for many digits
     if not 0 < states <= precise.MOST:
         return None
     with precise.digits():
         one, other = (_moved_widely(part, right, chosen, moves) for part in (g, again))
+        # the rows leave one open
         if one is None or other is None:
             return None
+        # both made into matrices without rounding
         found, beside = (made(part, precise.NOTHING) for part in (one, other))
         parts = _wide(found, _wide(beside))
         values = precise.decompose(np.asarray(beside.a, dtype=object)).values
@@ -300,6 +324,7 @@ def describe_lost(value: complex) -> NoLinearisation:
 
 def _moved_widely(g: Floats, right: Floats, chosen: NDArray[np.int64], moves: Floats) -> precise.Wide | None:
     """The variations of `_variations` in many digits; None where the rows leave one open."""
+    # all but the chosen follow from them
     rest = np.setdiff1d(np.arange(g.shape[1]), chosen)
     aim = precise.wide(right)
     aim[:, : chosen.size] -= precise.wide(g[:, chosen])
@@ -307,9 +332,11 @@ def _moved_widely(g: Floats, right: Floats, chosen: NDArray[np.int64], moves: Fl
     scale: Floats = np.exp2(np.round(np.log2(moves[rest]))).astype(np.float64)
     found = precise.wide(np.zeros((g.shape[1], right.shape[1])))
     solved = precise.eliminate_consistent(g[:, rest] * scale, aim)
+    # not determined
     if solved is None:
         return None
     found[rest] = precise.wide(scale)[:, None] * solved
+    # the chosen move as they are told
     found[chosen, np.arange(chosen.size)] += 1
     return found
 
@@ -321,15 +348,19 @@ def _variations(g: Floats, right: Floats, chosen: NDArray[np.int64], moves: Floa
     zeros stay zeros.  Where rows leave more open than the chosen (redundant multipliers), the least variation is.
     """
     states, rest = chosen.size, np.setdiff1d(np.arange(moves.size), chosen)
+    # units of the unknowns, then rows of size one
     scaled = g * moves
     size = np.abs(scaled).max(axis=1, initial=0.0)
     row = 1.0 / np.where(size > 0.0, size, 1.0)
     scaled, aim = row[:, None] * scaled, row[:, None] * right
+    # what the chosen contribute goes to the right
     aim[:, :states] -= scaled[:, chosen] / moves[chosen]
     matrix = scaled[:, rest]
+    # as many independent rows as unknowns, where there are
     kept = pivots(matrix, rest.size) if matrix.shape[0] >= rest.size else np.zeros(0, dtype=np.int64)
     found = np.zeros((moves.size, right.shape[1]))
     found[rest] = _solve_consistent(matrix, aim, kept)
+    # round-off beside the largest of a column is zero
     found[rest] = np.where(np.abs(found[rest]) > NOISE * np.abs(found[rest]).max(axis=0, initial=0.0), found[rest], 0.0)
     found[chosen, np.arange(states)] = 1.0 / moves[chosen]
     return moves[:, None] * found
@@ -339,6 +370,7 @@ def _solve_consistent(matrix: Floats, aim: Floats, kept: NDArray[np.int64]) -> F
     """The solution of consistent equations by rows that determine it, its residual small beside the terms of each row
     (Skeel 1980); by singular values where none do.
     """
+    # a square part that is regular: elimination, improved twice
     square = matrix[kept]
     solve = _inverse(square)
     if solve is not None:
@@ -346,6 +378,7 @@ def _solve_consistent(matrix: Floats, aim: Floats, kept: NDArray[np.int64]) -> F
         for _ in range(2):
             found = found + solve(aim[kept] - square @ found)
         return np.asarray(found)
+    # no such part: the least solution
     found = least_squares(matrix, aim, 1e-14)
     for _ in range(2):
         found = found + least_squares(matrix, aim - matrix @ found, 1e-14)
@@ -354,9 +387,11 @@ def _solve_consistent(matrix: Floats, aim: Floats, kept: NDArray[np.int64]) -> F
 
 def _inverse(square: Floats) -> Callable[[Floats], Floats] | None:
     """What solves by a square matrix; None where singular values say that it has no inverse."""
+    # large: a triangular factor, where its rank is sure
     sure = sure_solver(square, CERTAIN) if square.shape[0] > FEW else None
     if sure is not None:
         return sure
+    # singular values say that it has no inverse
     if not square.size or count(singular_values(square), CERTAIN) < square.shape[0]:
         return None
     return lambda aim: np.asarray(np.linalg.solve(square, aim), dtype=np.float64)
@@ -381,11 +416,14 @@ def _refuse_undetermined(
     """NoLinearisation where rates of states move though no state does: constraints are hidden deeper than the rows."""
     if part.shape[0] > max(FEW, part.shape[1]):  # the same directions, of a triangle
         part = np.linalg.qr(part)[1]
+    # directions in which no state moves
     _, _, vt = singular_decomposition(part) if part.size else (None, None, np.eye(tangent.shape[1]))
     still = tangent @ vt[rank:].T
+    # none, or nothing to move
     if not still.size or not rates.size:
         return
     loose = np.abs(still[rates]).max(axis=1) > np.sqrt(TOLERANCE)
+    # a rate that moves alone: the rows were not differentiated often enough
     if loose.any():
         names = tuple(system.name(int(k)) for k in chosen[loose])
         raise NoLinearisation(f"the equations do not determine the rate of {', '.join(names[:3])}", names)
@@ -397,14 +435,18 @@ def _without_rates_of_inputs(
     """The matrices of variations `moved` [z, states and inputs and their rates]."""
     starter, system, inputs, out = given.rows.starter, given.system, given.names, given.out
     states, n = chosen.size, system.form.written
+    # rates of the states: their own unknowns, or the flows
     yd = np.zeros((n, moved.shape[1]), dtype=moved.dtype)
     yd[starter.rates] = moved[n:]
     yd[system.form.k_q] = moved[system.form.k_f]
+    # outputs by unknowns and by rates; cancelled terms are zero
     seen = out.by_y @ moved[:n] + out.by_rate @ yd
     size = np.abs(out.by_y) @ np.abs(moved[:n]) + np.abs(out.by_rate) @ np.abs(yd)
     seen = np.where(np.abs(seen) > noise * size, seen, 0.0)
     slopes = moved[rates]
+    # states that nothing depends on drive nothing
     slopes[:, :states][:, given.loose[chosen]] = 0.0
+    # columns by states, integrals of inputs, inputs, u', u''
     cut = [0, states, *(states + k * len(inputs) for k in range(1, ORDERS + 1))]
     a, b_, b0, b1, b2 = (slopes[:, i:j] for i, j in pairwise(cut))
     c, d_, d0, d1, d2 = (seen[:, i:j] for i, j in pairwise(cut))
@@ -417,6 +459,7 @@ def _without_rates_of_inputs(
         c = np.hstack([c, d_[:, summed]])
         chosen = np.concatenate([chosen, np.full(summed.size, -1)])
         names = (*names, *(integral(inputs[k]) for k in summed))
+    # z = x - b1 u - b2 (u' + ...): a state without rates of inputs
     b = b0 + a @ (b1 + a @ b2)
     d0, d1, d2 = (part + own for part, own in zip((d0, d1, d2), out.by_input, strict=True))
     return Reduced(a, b, c, d0 + c @ (b1 + a @ b2), d1 + c @ b2, d2, chosen, names)

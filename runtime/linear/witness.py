@@ -55,17 +55,21 @@ class Witness:
     def contradicts(self, values: Values) -> bool:
         """Whether these are not the eigenvalues."""
         moving = values[values != 0.0]
+        # another number of states, or of zeros
         if values.size != self.states or values.size - moving.size != self.zeros:
             return True
+        # uncertain entries allow less agreement
         close = AGREE + (10.0 * self.loose if self.certain else 0.0)
         return abs(float(np.log(np.abs(moving)).sum()) - self.size) > close
 
 
 def witness(e: Floats, a: Floats) -> Witness | None:
     """None where the pencil is large or singular."""
+    # beyond LARGEST elimination in many digits takes long
     if not 0 < e.shape[0] <= LARGEST:
         return None
     with mpmath.workdps(DIGITS):
+        # again with other round-off: what that moves is uncertain
         one = _witness(e, a)
         other = _witness(shaken(e), shaken(a, 4)) if one is not None else None
     if one is None or other is None:
@@ -79,14 +83,18 @@ def agrees(e: Floats, a: Floats, values: Values) -> bool:
     certain, and that is so beyond the fastest and below the slowest of them that is not zero.
     """
     moving = np.abs(values[values != 0.0])
+    # all at zero: no constant to compare
     if not moving.size:
         return False
+    # decades between the slowest and the fastest, and beyond
     first, last = (int(np.floor(np.log10(x))) for x in (moving.min(), moving.max()))
     with mpmath.workdps(DIGITS):
         points = range(first - BEYOND, last + BEYOND + 1)
+        # farther out, more sparsely: the leading and the last term
         outside = (*range(-FAR, points[0], BEYOND), *range(FAR, points[-1], -BEYOND))
         found = {s: part for s in (*points, *outside) if (part := _certain(e, a, s, values)) is not None}
     constant = list(found.values())
+    # certain on both sides and for most of the points between: one constant
     outer = min(found, default=0) < first and max(found, default=0) > last + 1
     return outer and sum(s in points for s in found) > len(points) // 2 and max(constant) - min(constant) <= DETERMINED
 
@@ -94,6 +102,7 @@ def agrees(e: Floats, a: Floats, values: Values) -> bool:
 def _certain(e: Floats, a: Floats, power: int, values: Values) -> float | None:
     """Logarithm of |det(s E - A)| less those of |s - values| near s = 10^power; None where round-off moves it."""
     s = SHIFT * mpmath.mpf(10) ** power
+    # singular, or decided by round-off
     one, other = (_log_determinant(*part, s) for part in ((e, a), (shaken(e), shaken(a, 4))))
     if one is None or other is None or abs(one - other) > DETERMINED:
         return None
@@ -108,6 +117,7 @@ def spread(e: Floats, a: Floats) -> float:
 
 def _witness(e: Floats, a: Floats) -> Witness | None:
     first, last = _term(e, a, FAR), _term(e, a, -FAR)
+    # singular pencils have no term
     if first is None or last is None:
         return None
     return Witness(first[0], last[0], float(last[1] - first[1]))
@@ -115,11 +125,13 @@ def _witness(e: Floats, a: Floats) -> Witness | None:
 
 def _term(e: Floats, a: Floats, power: int) -> tuple[int, Any] | None:
     """Exponent of the term of the determinant that is alone at 10^power and beyond, logarithm of its coefficient."""
+    # between two far points one term alone remains: their quotient tells its exponent
     near, beyond = (_log_determinant(e, a, mpmath.mpf(10) ** p) for p in (power, power + np.sign(power)))
     if near is None or beyond is None:
         return None
     exponent = (beyond - near) / (mpmath.log(10) * int(np.sign(power)))
     whole = int(mpmath.nint(exponent))
+    # the exponent is a whole number, else other terms still count
     return (whole, near - whole * power * mpmath.log(10)) if abs(exponent - whole) < AGREE else None
 
 
@@ -129,7 +141,9 @@ def _log_determinant(e: Floats, a: Floats, s: Any) -> Any:
     rows = {i: {int(j): s * float(e[i, j]) - float(a[i, j]) for j in np.flatnonzero(places[i])} for i in range(len(e))}
     total = mpmath.mpf(0)
     while rows:
+        # the shortest row: least fill
         row = rows.pop(min(rows, key=lambda i: len(rows[i])))
+        # no entry is left: singular
         if not row:
             return None
         column = max(row, key=lambda j: abs(row[j]))

@@ -33,17 +33,22 @@ def reduce_witnessed(given: Given, pencil: Descriptor | None, *, fixed: bool) ->
     except NoLinearisation as error:
         why = error
     seen = witness(pencil.e, pencil.a) if fixed and pencil is not None else None
+    # the determinant contradicts, or there is nothing yet
     if seen is not None and pencil is not None and (small is None or seen.contradicts(_values(small))):
+        # certain: so many states in many digits
         if seen.certain:
             small = _in_many_digits(given, pencil, seen.states)
             lasting = small is not None and not seen.contradicts(_values(small))
+        # uncertain: whichever reduction agrees with the determinant
         else:
             other = _chosen_in_many_digits(given)
             held = [part for part in (small, other) if part is not None and agrees(pencil.e, pencil.a, _values(part))]
+            # entries of like sizes leave no doubt of the first one
             doubtful = spread(pencil.e, pencil.a) > CONTRAST or not _singular(pencil)
             small, lasting = held[0] if held else small, bool(held) or not doubtful
         if not lasting:
             raise why or _describe_contradiction(seen)
+    # no reduction held: why it failed
     if small is None:
         assert why is not None
         raise why
@@ -54,15 +59,18 @@ def _reduce(given: Given, pencil: Descriptor | None) -> Reduced:
     """The reduction by the rows that hold, or by the pencil where that holds too and knows more.  NoLinearisation."""
     small = None
     try:
+        # rows that hold, constraints differentiated
         small = reduce(given)
     except NoLinearisation:
         if pencil is None:
             raise
+    # constraints hidden deeper, or other states: by the pencil
     if pencil is not None and (small is None or _fewer(given, small)):
         small = _of_pencil(given, pencil)
     assert small is not None
     if small.unsure is not None and pencil is not None:  # the pencil may know it better
         small = _surer(small, given, pencil)
+    # modes that double precision does not hold are refused
     if small.unsure is not None:
         precise.refuse_lost(precise.eigenvalues(small.a), precise.eigenvalues(small.unsure), describe_lost)
     return small
@@ -81,15 +89,18 @@ def _in_many_digits(given: Given, form: Descriptor, states: int) -> Reduced | No
     system, n, loose = given.system, given.system.form.written, given.loose
     known = candidates_of(system, given.state, n)
     shown = system.kinds[known] == "q"
+    # displacements first, then what moves beside them, what is loose last
     groups = (known[shown & ~loose[known]], known[~shown & ~loose[known]], known[loose[known]])
     matrices = (form.e, form.a, form.b, form.c, form.cd, form.d)
     try:
         small = widely_parted(matrices, (*groups, np.arange(n, len(form.states))), states)
     except NoLinearisation:
         return None
+    # too large, or singular
     if small is None:
         return None
     names = tuple(form.states[int(k)] for k in small.places)
+    # integrals of inputs stand behind the unknowns: no places of the model
     return replace(small, names=names, places=np.where(small.places < n, small.places, -1))
 
 
@@ -98,6 +109,7 @@ def _of_pencil(given: Given, form: Descriptor) -> Reduced:
     system = given.system
     spaces = motions(form.e, form.a)
     n = system.form.written
+    # states of the form, and integrals of inputs behind them
     known = candidates_of(system, given.state, n)
     extra = np.arange(n, len(form.states))
     chosen = np.concatenate([chosen_states(system, spaces[0], spaces[2], known, given.loose), extra])
@@ -114,6 +126,7 @@ def _surer(small: Reduced, given: Given, form: Descriptor) -> Reduced:
         other = _of_pencil(given, form)
     except NoLinearisation:
         return small
+    # in many digits and of as many states
     return other if other.wide is not None and other.places.size == small.places.size else small
 
 
@@ -121,6 +134,7 @@ def _fewer(given: Given, small: Reduced) -> bool:
     """Whether the pencil, in the unit of time in which its ranks are plainest, has another number of states."""
     y, yd = given.state.for_form(given.system)
     jy, jyd = given.system.jacobian(given.state.t, y, yd)
+    # of a large model the pencil is not asked
     if given.system.unknowns > COUNTED:
         return False
     try:
@@ -146,6 +160,7 @@ def _values(small: Reduced) -> Values:
 def _describe_contradiction(seen: Witness) -> NoLinearisation:
     """What is said where the modes found are not those of the equations."""
     cause = "the modes found are not those of the equations"
+    # round-off of the entries themselves decides
     if not seen.certain:
         cause = "the entries of the equations, rounded, do not hold all modes"
     return NoLinearisation(

@@ -32,22 +32,27 @@ def anchors(settler: Settler, system: System, t: float, point: tuple[Floats, Flo
     point: y, yd [written] of the nominal start.
     """
     n = system.form.written
+    # dense null spaces beyond this cost too much
     if n + settler.rates.size > LARGEST:
         return None
+    # what the text said and the start kept: it holds for other numbers too
     guess, _, said = statements(system.form.at, n, system.description.initial)
     state = np.isin(system.kinds[:n], STATE)
     stayed = np.abs(point[0] - guess) <= AGREES * np.maximum(magnitude[:n], np.abs(guess))
     anchored = said & stayed & state
     may = ~said & stayed & state
     matrix = _scaled_jacobian(settler, t, point, magnitude)
+    # as long as something is open, what moves most there is held as well
     while True:
         free = np.concatenate([~anchored, np.ones(settler.rates.size, dtype=bool)])
         null = _null(matrix[:, free])
         component = np.zeros(free.size)
         component[free] = np.abs(null).max(axis=0, initial=0.0) if null.size else 0.0
+        # the rows determine everything else
         if not (component[:n] > OPEN).any():
             return anchored
         choice = np.where(may & ~anchored, component[:n], 0.0)
+        # something is open that no anchor closes
         k = int(np.argmax(choice))
         if choice[k] <= OPEN:
             return None
@@ -59,6 +64,7 @@ def _scaled_jacobian(settler: Settler, t: float, point: tuple[Floats, Floats], m
     system = settler.system
     jy, jyd = system.jacobian(t, *point)
     matrix = np.hstack([system.dense(jy), system.dense(jyd)[:, settler.rates]]) * settler.scale
+    # entries that are no numbers count as none
     matrix[~np.isfinite(matrix)] = 0.0
     size = np.abs(matrix).max(axis=1, initial=0.0)
     return np.asarray(matrix / np.where(size > 0.0, size, 1.0)[:, None])
@@ -66,6 +72,7 @@ def _scaled_jacobian(settler: Settler, t: float, point: tuple[Floats, Floats], m
 
 def _null(matrix: Floats) -> Floats:
     """Null vectors as rows [k, columns]."""
+    # no columns, or no rows: nothing, or all, is open
     if not matrix.shape[1]:
         return np.zeros((0, 0))
     if not matrix.shape[0]:

@@ -59,10 +59,12 @@ def way_of(
     written: System, start: ConsistentState, facts: Structure, options: Options, method: str
 ) -> tuple[Way, ConsistentState]:
     """The way with the method that a nominal run took, and the start in its layout."""
+    # as `simulate` begins: redundant constraints, index form, method
     written, start, facts = without_redundant(written, start, facts, options)
     system, index, _ = form_system(written, start, facts, options)
     first = Way(choose_method(options), system, index, form_name(system, facts))
     ways = (first,) if options.method != "auto" else alternatives(first, written, start, options)
+    # the way that the nominal run took
     found = next((way for way in ways if way.method == method), None)
     if found is None:
         raise NotApplicableError(f"the nominal run took method {method}")
@@ -71,12 +73,16 @@ def way_of(
 
 def obstacle(options: Options) -> str | None:
     """Why runs with these options are made one by one; None where nothing is in the way."""
+    # nothing asked of any quantity
     if options.accuracy is None and not options.accuracy_on:
         return "the solver's own tolerances are given: there is no accuracy to be controlled"
+    # tolerances of the user
     if options.rtol is not None or options.atol is not None or options.method == "euler":
         return "the solver's own tolerances are given: there is no accuracy to be controlled"
+    # events need Python between steps
     if options.events:
         return "the model has events"
+    # stops of sources: other numbers have other ones
     if options.stops is not None and np.isfinite(np.asarray(options.stops)).any():
         return "the text jumps or has kinks in time"
     if options.redundancy == "minimum_norm":

@@ -74,14 +74,17 @@ class Batch:
         why = obstacle(options)
         if why is not None:
             raise NotApplicableError(why)
+        # only ends are wanted: rows between them need not be stored
         if keep == END and not claims:
             options = replace(options, every=None, at=())
+        # what one run would do besides belongs to the first run alone
         options = replace(options, output=None, progress=None, watch=None, wall_began=None, cpu_compile=0.0)
         self.options, self.way = options, way
         way.system.own_numbers()  # the core writes there
         self._alive: list[Any] = []  # what the core has addresses of
         self.runs = Runs(start, self.options, way)
         meters = self.runs.quantities.meters
+        # meters are compared in Python alone
         if meters or not self.runs.columns:
             raise NotApplicableError("accuracy is asked of a meter" if meters else "nothing is traced")
         self.system, self.start = way.system, start
@@ -90,9 +93,11 @@ class Batch:
         law = way.law
         self._targets = self._wanted_quantities()
         finest = float(np.min(self._targets, initial=1.0))
+        # draft and run behind it at the tolerances that `control` would take
         tolerance = law.tolerance(finest if finest < 1.0 else 1e-4)
         draft = min(max(tolerance, law.finest) / law.ratio, law.loosest)
         fine = max(min(tolerance, law.ratio * draft), law.finest)
+        # steps as long as they like: dopri tells an end without rows between
         longest = FREELY if free and way.method == "dopri" and keep == END else LONGEST
         try:
             self.passes = tuple(self._pass(k, (draft, fine)[k], longest) for k in (0, 1))
@@ -103,6 +108,7 @@ class Batch:
         self._measure(longest, law, draft, fine)
         self._claims(claims)
         self.core.keep = keep
+        # rates that the equations leave open are not stored
         if keep == ROWS:
             written = way.system if way.system.form.name == "3" else way.system.another("3")
             self.runs.derive(determined_rates(written, start))
@@ -114,12 +120,15 @@ class Batch:
         What a run's estimate then misses costs it a finer run, never its promise.
         """
         guess = statements(self.system.form.at, self.system.form.written, self.system.description.initial)[0]
+        # the nominal run in the core shows how much its tolerances leave over
         found = self.run(self.system.description.p[None, :], guess[None, :])
+        # without a result traces cannot be had here; ends may still be for other numbers
         if found.state[0] != DONE:
             if self.core.keep == ROWS:
                 raise NotApplicableError(f"the nominal run has no result in the core: {WHY[found.state[0]]}")
             return
         over = float(found.estimate[0]) / float(np.min(self._targets, initial=1.0))
+        # error ~ tolerance^power: up to LOOSER times
         factor = float(np.clip((MARGIN / max(over, 1e-9)) ** (1.0 / law.power), 1.0, LOOSER))
         tolerance = self.core.tolerance
         factor = max(min(factor, law.loosest / tolerance[0]), 1.0)
@@ -141,8 +150,10 @@ class Batch:
         """The structures of the draft (0), or of the runs behind it (1)."""
         runs, options = self.runs, self.options
         runs.controlled, runs.instants.open = True, False  # every run is compared at instants of the draft
+        # instants of the trace, and those of comparison
         request: Request = runs.request(tolerance, None, longest)
         instants, kinds = runs.instants.rows(compared=True, draft=not number)
+        # what the core cannot do for many runs is switched off
         request = replace(
             request,
             instants=instants,
@@ -156,12 +167,14 @@ class Batch:
             max_wall=None,
         )
         made = Integration(self.system, self.start, request)
+        # stiffness is counted, not waited for
         if self.way.method == "dopri":
             made.method.contents.patience = request.stiff_steps
         return made
 
     def _regions(self, made: list[tuple[int, int]], zero: list[int | None]) -> tuple[Any, int]:
         """Regions (address, bytes) as they are now, and integers that begin at 0."""
+        # what a run writes, as it is now: put back before the next one
         found = [(at, size, bytes(c.string_at(at, size))) for at, size in made]
         found += [(at, 4, bytes(4)) for at in zero if at]
         regions = (lib.Region * max(len(found), 1))()
@@ -174,6 +187,7 @@ class Batch:
 
     @staticmethod
     def _settle(settler: Settler) -> list[tuple[int, int]]:
+        # the stepper, the run, the settlers
         core = settler.core.contents
         moves = core.unknowns + core.rates
         return [(c.addressof(core), c.sizeof(lib.Settle)), (core.scale, 8 * moves)]
@@ -188,6 +202,7 @@ class Batch:
         for settler in settlers:
             states += self._settle(settler)
             zero += [lib.core.sd_linear_pivoted(settler.linear), lib.core.sd_settle_pivoted(settler.core)]
+        # the underlying equation has factors of its own
         if made.underlying is not None:
             states.append((c.addressof(made.underlying.core.contents), c.sizeof(lib.Underlying)))
         zero += [lib.core.sd_linear_z_pivoted(item) for item in made.method.complex]
@@ -196,6 +211,7 @@ class Batch:
         made.driver.run.start_rate = lib.pointer(rooms[2])
         regions, number = self._regions(states, zero)
         kind = type(core)
+        # fields of the core's structure, in its order
         field = self.core.passes[k]
         field.run, field.region, field.regions = c.addressof(made.driver.run), c.addressof(regions), number
         field.n = system.unknowns
@@ -213,9 +229,11 @@ class Batch:
     @staticmethod
     def _counters(made: Integration) -> list[int | None]:
         """Addresses of what is counted."""
+        # counters: of the method, of the matrices, of evaluations
         method, linear, own = made.method.contents, made.linear.contents, made.stepped.core
         found: list[tuple[Any, str]] = [(method, name) for name in COUNTED]
         found += [(linear, "factorisations"), (own, "residual_evaluations"), (own, "jacobian_evaluations")]
+        # evaluations of the underlying equation are counted apart
         if made.underlying is not None:
             found.append((made.underlying.applied, "residual_evaluations"))
             found.append((made.underlying.matrix, "jacobian_evaluations"))
@@ -225,12 +243,15 @@ class Batch:
     def _begin(self) -> None:
         """The start of every run."""
         many, system, made = self.core, self.system, self.passes[1]
+        # unknowns that the text gives for each run
         n = system.form.written
         y, yd = (np.ascontiguousarray(item[:n]) for item in (self.start.y, self.start.yd))
         found = anchors(made.settler, system, self.start.t, (y, yd), made.sizes.magnitude)
+        # the start of other numbers would not follow the same way
         if found is None:
             raise NotApplicableError("initial values of the text leave the start open, or move for its sake")
         self.anchored = found
+        # the settler that holds these
         settler = made.settlers.settler_of("settled", found)
         settled = settler.system
         # rows written with room for what settles: the buffers of both passes are used
@@ -239,19 +260,23 @@ class Batch:
         core = settler.core.contents
         core.hold = HELD
         a, b = extended[0].copy(), extended[1].copy()
+        # the nominal start must settle in the core as it did in Python
         failed = lib.core.sd_settle_point(settler.core, self.start.t, lib.pointer(a), lib.pointer(b))
         settled.failure.check()
         if failed:
             raise NotApplicableError("the nominal start does not settle")
+        # entries there: those that are zero for good are left out of the pivots
         jy, jyd = settled.jacobian(self.start.t, a[:n], b[:n])
         core.hold, core.ready = HELD, 0
         many.smallest = settler.linear.contents.smallest
+        # states of the settler as they begin
         factors = [lib.core.sd_linear_pivoted(settler.linear), lib.core.sd_settle_pivoted(settler.core)]
         regions, number = self._regions(self._settle(settler), factors)
         many.start, many.region, many.regions = c.addressof(core), c.addressof(regions), number
         self._alive += [settler, settled]
         many.y0, many.yd0 = self._keep_address(y.copy()), self._keep_address(yd.copy())
         many.anchored = self._keep_address(found.astype(np.int32))
+        # guesses for what is not held
         guess, _, said = statements(system.form.at, n, system.description.initial)
         many.guessed, many.guess = self._keep_address((said & ~found).astype(np.int32)), self._keep_address(guess)
         many.size = self._keep_address(made.sizes.magnitude[:n].copy())
@@ -265,6 +290,7 @@ class Batch:
     def _rates(settler: Settler, n: int) -> Floats:
         """Magnitudes of the rates [n]; 0 of those that occur nowhere."""
         found = np.zeros(n)
+        # M decides how least changes weigh
         found[settler.rates] = settler.scale[n:]
         return found
 
@@ -279,22 +305,26 @@ class Batch:
 
     def _measure(self, longest: float, law: Any, draft: float, fine: float) -> None:
         """Magnitudes, quantities, accuracy and room."""
+        # the program: sizes, span, numbers of the model
         many, options, runs, system = self.core, self.options, self.runs, self.system
         n, columns = system.form.written, len(self.columns)
         span = options.t_end - options.t_start
         many.p, many.parameters = lib.pointer(system.description.p), system.description.p.size
         many.written, many.columns, many.observed = n, columns, self.passes[1].driver.observed
         many.t0, many.t1 = options.t_start, options.t_end
+        # magnitudes of each run by its own numbers
         sizes = sizing(system)
         self._alive.append(sizes)
         many.system, many.sizing = c.addressof(system.core), c.addressof(sizes.core)
         many.order = net_order_of(system).address
         many.form_jy, many.form_jyd = (self._keep_address(np.zeros(system.pattern.entries + 1)) for _ in range(2))
         many.found, many.ceiling = (self._keep_address(np.zeros(system.unknowns + 1)) for _ in range(2))
+        # both passes: draft and run
         for k in (0, 1):
             self._fill(k, min((DRAFT, 1.0)[k] * longest * span, options.longest or np.inf))
         many.column = self._keep_address(np.array([column.place for column in runs.columns], dtype=np.int32))
         many.target = self._keep_address(self._targets)
+        # quantities and unknowns of one unit share the largest
         families = system.description.families
         units: dict[str, int] = {}
         own = [units.setdefault(column.unit, len(units)) for column in runs.columns]
@@ -304,11 +334,14 @@ class Batch:
                 of[first : first + family.size] = units[family.unit]
         many.unit, many.unit_of = self._keep_address(np.array(own, dtype=np.int32)), self._keep_address(of)
         many.units, many.known = len(units), int(runs.instants.common is not None)
+        # instants within the time tolerance, as `compared` has it
         asked = float(np.min(self._targets[np.isfinite(self._targets)], initial=1.0))
         many.late = min(pairs.TIMING, pairs.SHARE * asked) * span
+        # the law of the method's error
         for name in ("power", "credit", "finest", "far", "ratio", "little", "growth"):
             setattr(many, name, getattr(law, name))
         many.fall = law.order
+        # rules of the estimate: constants of Python are not repeated in C
         many.rules = lib.Rules(
             safety=laws.SAFETY,
             aim=estimate.AIM,
@@ -328,6 +361,7 @@ class Batch:
             few=estimate.SHORT,
             runs=control.RUNS,
             instants=MOST,
+            # room for the rows of three runs: draft, run, and a finer one
         )
         many.few_steps, many.many_steps = FEW_STEPS, law.most
         many.tolerance[0], many.tolerance[1] = draft, fine
@@ -348,9 +382,11 @@ class Batch:
 
     def _claims(self, claims: tuple[Claim, ...]) -> None:
         """Expectations that the core looks at."""
+        # names to rows of the observers
         place = {name: k for k, name in enumerate(self.runs.names)}
         made = (lib.RunClaim * max(len(claims), 1))()
         for k, claim in enumerate(claims):
+            # -1: no window
             within = -1 if claim.within is None else place[claim.within]
             moment = {"always": 0, "finally": 1}.get(claim.moment, 2)
             op = ("==", "!=", "<", "<=", ">", ">=").index(claim.operator)
@@ -360,6 +396,7 @@ class Batch:
 
     def run(self, p: Floats, anchor: Floats) -> Results:
         """Runs with numbers p [k, parameters] and initial values anchor [k, written] (guesses of all unknowns)."""
+        # an entry for each run, no numbers where it has none
         number, columns = len(p), len(self.columns)
         p, anchor = np.ascontiguousarray(p), np.ascontiguousarray(anchor)
         found = Results(
@@ -373,6 +410,7 @@ class Batch:
             np.full((number, columns, self._thin.size), np.nan),
         )
         before = self.system.description.p.copy()
+        # each run has its numbers in p: put back behind them
         names = ("state", "steps", "estimate", "cpu", "end", "least", "most", "traces")
         results = (lib.pointer(getattr(found, name)) for name in names)
         lib.core.sd_many_runs(c.byref(self.core), number, lib.pointer(p), lib.pointer(anchor), *results)
@@ -387,8 +425,10 @@ class Batch:
         runs, core, made = self.runs, self.core, self.passes[1]
         runs.accounts.began = time.monotonic()
         found = self.run(p[None, :], anchor[None, :])
+        # the core refused or failed: `simulate` runs it itself
         if found.state[0] != DONE:
             return None
+        # statistics as one run of `simulate` has them
         runs.accounts.cpu, runs.accounts.wall = core.spent, time.monotonic() - runs.accounts.began
         steps, rejected, newton, factorisations, *evaluated = core.counted
         residuals, jacobians = (evaluated[k] + evaluated[k + 2] for k in (0, 1))
@@ -402,11 +442,13 @@ class Batch:
             made.settler.core.contents.failures,
             made.driver.ledgers,
         )
+        # the rows of the last run are still there
         rows = made.driver.rows[: core.held]
         writer = Held(replace(runs.layout(made.method.contents.rtol, None), parameters=parameters))
         writer.append(rows[(rows[:, 1].astype(np.int32) & TRACE) > 0])
         runs.done = finished, [], writer
         estimate = float(found.estimate[0])
+        # judged as in Python
         judgement = judge(
             self.options, runs.method, finished.balances, True, not_met_undefined(writer.first_undefined())
         )

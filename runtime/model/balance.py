@@ -24,6 +24,7 @@ class Balance:
     def __init__(
         self, number: int, rows: NDArray[np.integer], columns: NDArray[np.integer], kind: NDArray[np.integer]
     ) -> None:
+        # the core reads int32
         places = tuple(np.ascontiguousarray(item, dtype=np.int32) for item in (rows, columns, kind))
         self._arrays = places
         kinds = 1 + int(kind.max(initial=0))
@@ -41,9 +42,11 @@ class Balance:
         Of several rows' proposals the least counts, or the largest; capped: none above the largest of its like that is
         known, for along a chain each overestimates the next, and a run mends what is too small alone.
         """
+        # sizes and free terms; no mask
         found = magnitude.copy()
         flags = LARGEST * largest + CAPPED * capped
         given = lib.pointer(size), lib.pointer(excited), None
+        # no room for the search
         if lib.core.sd_propagate(self.address, *given, flags, lib.pointer(found)):
             raise MemoryError
         return found

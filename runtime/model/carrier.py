@@ -36,12 +36,14 @@ class Failure:
 
     def note(self, exception: BaseException) -> None:
         """Remembers the exception and tells the core to stop."""
+        # the first exception counts: what follows comes of it
         if self.exception is None:
             self.exception = exception
         self.flag[0] = 1
 
     def check(self) -> None:
         """Raises what a callback raised; afterwards the system can be used again."""
+        # the core has stopped: the exception goes on in Python
         if self.exception is not None:
             exception, self.exception = self.exception, None
             self.flag[0] = 0
@@ -93,15 +95,18 @@ class LibraryCarrier:
 
     def __init__(self, path: str | Path) -> None:
         self.path = Path(path)
+        # a file that is no library, or has no contract
         try:
             self._library = c.CDLL(str(self.path.resolve()))
             version = c.c_int.in_dll(self._library, "sd_contract").value
         except ValueError as error:
             raise ContractError(f"{self.path}: not a compiled model: {error}") from error
+        # compiled for another version of the contract
         if version != CONTRACT:
             raise ContractError(f"{self.path}: contract {version}, this runtime reads {CONTRACT}")
 
     def _address(self, name: str) -> int:
+        # a block without its function: compiled by another compiler
         try:
             address = c.cast(getattr(self._library, name), c.c_void_p).value
         except AttributeError as error:
@@ -136,12 +141,14 @@ class ModuleCarrier:
 
     def bind(self, block: str, tables: Tables, extent: Extent, failure: Failure) -> Pointers:
         """Callbacks that look at the core's arrays through NumPy."""
+        # residuals, then slopes where there are entries
         made = [_callback(self._function(f"{block}_rows"), tables, extent.y, extent.r, failure)]
         for part, number in (("dy", extent.dy), ("dyd", extent.dyd)):
             if number:
                 made.append(_callback(self._function(f"{block}_{part}"), tables, extent.y, number, failure))
         address = [c.cast(callback, c.c_void_p).value for callback in made]
         assert address[0] is not None
+        # addresses in the order of `made`
         rest = iter(address[1:])
         return Pointers(address[0], next(rest) if extent.dy else None, next(rest) if extent.dyd else None, tuple(made))
 
@@ -150,15 +157,18 @@ def _callback(function: Callable[..., None], tables: Tables, inputs: int, output
     """A C function pointer to function(p, ix, at, to, t, y, yd, out)."""
     views: dict[tuple[int, int], Floats] = {}
 
+    # arrays over the core's memory, made once for each address
     def view(address: int, number: int) -> Floats:
         found = views.get((address, number))
         if found is None:
+            # addresses that come and go must not fill the memory
             if len(views) > _VIEWS:
                 views.clear()
             found = reader(address, number)
             views[address, number] = found
         return found
 
+    # no exception may cross C: noted, and the run stops
     def call(frame: int, t: float, y: int, yd: int, out: int) -> None:
         try:
             with np.errstate(all="ignore"):

@@ -148,7 +148,9 @@ def reader(address: int, number: int) -> NDArray[np.float64]:
 
 
 def _load() -> Any:
+    """The core with the types of its functions: ctypes would pass pointers as ints of 32 bits."""
     core = c.CDLL(str(_core.__file__))
+    # result and arguments of each function, as its header declares them
     signatures: dict[str, tuple[Any, list[Any]]] = {
         "sd_residual": (None, [_P, _D, _P, _P, _P]),
         "sd_slopes": (None, [_P, _D, _P, _P, c.c_int, _P]),

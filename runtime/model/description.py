@@ -53,6 +53,7 @@ SCALE = "_scale"
 def count(shape: Shape) -> int:
     """Elements of a family of that shape; scalars have one."""
     size = 1
+    # no shape: a scalar
     for first, last in shape:
         size *= max(last - first + 1, 0)
     return size
@@ -60,9 +61,11 @@ def count(shape: Shape) -> int:
 
 def element(name: str, shape: Shape, position: int) -> str:
     """The name of the element at a row-major position: x, x[3], x[2, 5]."""
+    # scalars have no index
     if not shape:
         return name
     index = []
+    # from the last index: row-major
     for first, last in reversed(shape):
         position, rest = divmod(position, last - first + 1)
         index.append(str(first + rest))
@@ -83,8 +86,10 @@ Elements = Sequence[tuple[str, str, int]]
 
 def name_of(name: str, shape: Shape, elements: Elements, position: int) -> tuple[str, str, int]:
     """What the element of a family is called, and where it stands ("", 0: where the family does)."""
+    # elements by array arithmetic
     if not elements:
         return element(name, shape, position), "", 0
+    # elements with names of their own: `v1#.multiplier`
     own, file, line = elements[shape[0][0] + position]
     _, _, tail = name.partition("#")  # v1#.multiplier, C1#.2'
     return own + re.sub(r"^\.\d+", "", tail), file, line
@@ -123,6 +128,7 @@ class Family(_Elements):
     def name_of(self, position: int, name: str = "") -> str:
         """What an element is called, as the text writes it: the index behind its owner: `x[2]'`."""
         name = name or self.name
+        # a name that is not its owner's with something behind it
         if self.elements or not name.startswith(self.owner):
             return name_of(name, self.shape, self.elements, position)[0]
         return element(self.owner, self.shape, position) + name[len(self.owner) :]
@@ -202,6 +208,7 @@ def statements(
     has no such unknown (a displacement that is traced alone).
     """
     values, fixed, written = np.zeros(size), np.zeros(size, dtype=bool), np.zeros(size, dtype=bool)
+    # fixed values after guesses: of an unknown that is said twice they count
     for item in sorted((item for item in initial if at[item.family] >= 0), key=lambda item: item.fixed):
         own = at[item.family] + item.positions
         values[own], written[own] = item.values, True
@@ -255,7 +262,9 @@ def _shape(value: Any) -> Shape:
 
 
 def _shapes(value: Any, names: Sequence[str]) -> list[Shape]:
+    # by name or in the order of the families
     items = [value[name] for name in names] if isinstance(value, Mapping) else list(value)
+    # a binding of another model
     if len(items) != len(names):
         raise ContractError(f"the binding has {len(items)} shapes for {len(names)} families")
     return [_shape(item) for item in items]
@@ -272,16 +281,20 @@ def _pairs(value: Any) -> tuple[tuple[Reference, Reference], ...]:
 
 def _bound(value: Any, depth: int) -> Index:
     """A loop's bound: a slot of ix, or an index that may follow a loop outside of it."""
+    # a slot alone
     if isinstance(value, int):
         return (-1, value, 0)
     loop, slot, constant = (int(part) for part in value)
+    # inner bounds follow outer loops only
     if loop >= depth:
         raise ContractError(f"a bound of loop {depth} follows loop {loop}")
     return (loop, slot, constant)
 
 
 def _kernel(value: Mapping[str, Any]) -> Kernel:
+    # loops from the outside in
     loops = tuple((_bound(low, depth), _bound(high, depth)) for depth, (low, high) in enumerate(value.get("loops", ())))
+    # None: not said, so everything may be read
     names = ("reads", "rates", "curved", "bent")
     reads, rates, curved, bent = (frozenset(value[name]) if name in value else None for name in names)
     rows = tuple(_reference(row) for row in value.get("rows", ())) if loops else ()
@@ -310,6 +323,7 @@ def _row(value: Mapping[str, Any], shape: Shape) -> RowFamily:
 
 def _family(value: Mapping[str, Any], shape: Shape) -> Family:
     """A family of unknowns from the manifest, its size from the binding."""
+    # a kind that this runtime does not know
     if value["kind"] not in KINDS:
         raise ContractError(f"family {value['name']}: unknown kind {value['kind']!r}")
     nominal = value.get("nominal")
@@ -326,6 +340,7 @@ def _family(value: Mapping[str, Any], shape: Shape) -> Family:
 
 def _initial(value: Mapping[str, Any], names: Mapping[str, int], families: Sequence[Family]) -> Initial:
     """Initial values of one statement from the binding."""
+    # by name or number of the family
     family = value["family"]
     place = names[family] if isinstance(family, str) else int(family)
     return Initial(
@@ -348,15 +363,18 @@ def describe(manifest: Mapping[str, Any], binding: Mapping[str, Any]) -> Descrip
 
     Raises ContractError where they do not fit each other.
     """
+    # a binding that stands alone hands on what the last one was made of
     before: Description | None = binding.get("layouts", {}).get("last") if binding.get("alone") else None
     if before is not None:
         return _again(before, binding)
+    # the manifest may be whole
     structure = manifest.get("structure", manifest)
     families, rows = structure["families"], structure["rows"]
     shapes = _shapes(binding["shapes"], [str(item["name"]) for item in families])
     row_shapes = _shapes(binding["row_shapes"], [str(item.get("label")) for item in rows])
     names = {str(item["name"]): k for k, item in enumerate(families)}
     layouts = binding.get("layouts", {})  # of other bindings of the same sizes
+    # once for all bindings of the same sizes
     if "described" not in layouts:
         layouts["described"] = (
             tuple(_family(item, shape) for item, shape in zip(families, shapes, strict=True)),
@@ -367,6 +385,7 @@ def describe(manifest: Mapping[str, Any], binding: Mapping[str, Any]) -> Descrip
             },
         )
     own_families, own_rows, blocks = layouts["described"]
+    # what differs from binding to binding
     initial = tuple(_initial(item, names, own_families) for item in binding.get("initial", ()))
     found = Description(
         families=own_families,
@@ -383,6 +402,7 @@ def describe(manifest: Mapping[str, Any], binding: Mapping[str, Any]) -> Descrip
         constants=tuple((int(row), int(place), int(number)) for row, place, number in binding.get("offsets", ())),
         complementary=bool(structure.get("complementary")),
     )
+    # remembered for the next binding of this model
     if binding.get("alone"):
         layouts["last"] = found
     return found
@@ -393,8 +413,10 @@ def _numbers(binding: Mapping[str, Any]) -> Floats:
     the next run.
     """
     p = np.asarray(binding["p"], dtype=np.float64)
+    # events write into p, and the next run too: a copy
     if not binding.get("stand") or binding.get("alone"):
         return p.copy()
+    # of a large model p is where it is, and must not be written to
     p = p[:]
     p.flags.writeable = False
     return p
@@ -404,9 +426,11 @@ def _again(before: Description, binding: Mapping[str, Any]) -> Description:
     """A description of the same structure with the numbers of a binding."""
     before.p[:] = binding["p"]
     own, given = before.initial, binding.get("initial", ())
+    # other places than before: statements anew
     if any(old.positions is not new["positions"] for old, new in zip(own, given, strict=True)):
         names = {family.name: k for k, family in enumerate(before.families)}
         return replace(before, initial=tuple(_initial(item, names, before.families) for item in given))
+    # the same places: values alone
     values = (np.atleast_1d(np.asarray(item["values"], dtype=np.float64)) for item in given)
     found = (Initial(i.family, i.positions, v, i.fixed, i.label) for i, v in zip(own, values, strict=True))
     return replace(before, initial=tuple(found))

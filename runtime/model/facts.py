@@ -36,17 +36,19 @@ class Facts:
 
     def once(self, name: Hashable, make: Callable[[], Found]) -> Found:
         """What follows from the structure of this form alone: made once for all runs of a text with these sizes."""
+        # kept by the description, so that all systems of these sizes share it
         key = "once", name, self.form.name, self.left_out
         if key not in self.description.layouts:
             self.description.layouts[key] = make()
         return self.description.layouts[key]  # type: ignore[no-any-return]
 
     def once_if_small(self, name: Hashable, make: Callable[[], Found]) -> Found:
-        """The same where keeping it costs no room to speak of; else made anew."""
+        """What `make` returns, kept where that costs no room to speak of; else made anew."""
         return self.once(name, make) if self.unknowns <= KEPT else make()
 
     def forget(self) -> None:
         """Lets go of what follows from this form's structure, where no other run has it: found again if asked."""
+        # kept for no other run
         if self.description.systems is None:
             layouts = self.description.layouts
             for key in [k for k in layouts if isinstance(k, tuple) and self.form.name in (k[0], k[1], *k[2:3])]:
@@ -59,11 +61,12 @@ class Facts:
         if self.description.systems is None:
             layouts = self.description.layouts
             made = [k for k in layouts if isinstance(k, tuple) and k[0] == "once"]
+            # orders of elimination are dear: they stay
             for key in [k for k in made if k[1] not in DEAR and k[1][0] not in DEAR]:
                 del layouts[key]
 
     def forget_once(self, name: Hashable) -> None:
-        """The same of one thing that was made once."""
+        """Lets go of one thing that was made once, where no other run has it."""
         if self.description.systems is None:
             self.description.layouts.pop(("once", name, self.form.name, self.left_out), None)
 
@@ -108,8 +111,10 @@ class Facts:
     def _are(self, kinds: tuple[str, ...]) -> Mask:
         mask = np.zeros(self.unknowns, dtype=bool)
         for family, first in zip(self.description.families, self.form.at, strict=True):
+            # -1: not in this form
             if family.kind in kinds and 0 <= first < self.unknowns and family.kind != "audit":
                 mask[first : first + family.size] = True
+        # nu stand behind the unknowns as written
         if self.form.name != "start":
             mask[self.form.written :] = "nu" in kinds
         return mask
@@ -121,6 +126,7 @@ class Facts:
     def _of_groups(self, names: tuple[str, ...]) -> Mask:
         mask = np.zeros(self.rows, dtype=bool)
         for group, family, first in self.form.groups:
+            # rows of a group, family by family
             if group in names:
                 mask[first : first + self.description.rows[family].size] = True
         return mask
@@ -133,6 +139,7 @@ class Facts:
     def _family_of(self) -> Ints:
         found = np.full(self.unknowns, -1, dtype=np.int32)
         for k, family in enumerate(self.description.families):
+            # audits are no unknowns
             if self.form.at[k] >= 0 and family.kind != "audit":
                 found[self.form.at[k] : self.form.at[k] + family.size] = k
         return read_only(found)
@@ -160,7 +167,7 @@ class Facts:
 
     @property
     def named(self) -> Floats | None:
-        """The same; None where the manifest names none."""
+        """Nominal value of each unknown [unknowns]; None where the manifest names none."""
         return self.nominal if any(family.nominal is not None for family in self.description.families) else None
 
     def _nominal(self) -> Floats:

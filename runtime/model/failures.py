@@ -78,6 +78,7 @@ class SolverFailure(Exception):  # noqa: N818 (a name of the house)
         self.partial: object = None
         self.state: tuple[float, NDArray[np.float64], NDArray[np.float64]] | None = None
         """t [s], y, yd [unknowns as written] at the last good point."""
+        # where it is known: the row and the unknown that gave way
         place = "".join(
             [f", row {row}" if row else "", f", unknown {unknown}" if unknown else ""],
         )
@@ -105,6 +106,7 @@ class InconsistentStart(Exception):  # noqa: N818
     ) -> None:
         self.kind, self.residual = kind, residual
         self.rows, self.candidates, self.names = rows, candidates, names
+        # rows if there are any, else the unknowns
         where = ", ".join(map(str, rows)) or ", ".join(names)
         free = f"; fixed values in the way: {', '.join(map(str, candidates))}" if candidates else ""
         super().__init__(f"{kind}: residual {residual:.3g} in {where}{free}")

@@ -138,8 +138,10 @@ class Form:
         return self._along(1)
 
     def _along(self, part: int) -> Ints:
+        # of a small model the arrays stand
         if self.k_few is not None:
             return self.k_few[part]
+        # of a large one stretches: first row, number, first place
         number, first, begin = self.k_span[:, 0], self.k_span[:, 1], self.k_span[:, 2 + part]
         found = np.repeat(begin - first, number)
         found += np.arange(found.size, dtype=np.int32)
@@ -152,9 +154,11 @@ class Form:
 
     def row_label(self, description: Description, row: int) -> RowLabel:
         """The author's label of a row."""
+        # q' = f of a coordinate
         if row < self.kinematics:
             place = int(self.k_q[row])
             return RowLabel(f"{unknown_name(description, self, place)}' = f", "kinematic")
+        # else the last group that begins at or before it
         for group, family, first in reversed(self.groups):
             if row >= first:
                 label = description.rows[family].label_at(row - first)
@@ -165,10 +169,12 @@ class Form:
 def unknown_name(description: Description, form: Form, place: int) -> str:
     """Name of the unknown at a place of y."""
     known = place < form.written or form.name == "start"
+    # as written: by its family
     for k in reversed(np.flatnonzero(form.at <= place).tolist() if known else []):
         family = description.families[k]
         if family.kind != "audit" and place < form.at[k] + family.size:
             return family.name_of(place - int(form.at[k]))
+    # nu behind the multipliers as written, in the order of the kappa
     place -= form.written
     for k in description.families_of("kappa"):
         family = description.families[k]
@@ -190,12 +196,14 @@ def _layout(description: Description, others: tuple[str, ...]) -> tuple[Ints, li
     at = np.full(len(description.families), NOWHERE, dtype=np.int32)
     kinds: list[tuple[str, int]] = []
     end = 0
+    # kinds that stand beside the unknowns have no place as written
     for k, family in enumerate(description.families):
         if family.kind not in BESIDE:
             at[k] = end
             kinds.append((family.kind, family.size))
             end += family.size
     written = end
+    # kinds of this form alone stand behind
     for kind in others:
         for k in description.families_of(kind):
             at[k] = end
@@ -210,15 +218,18 @@ def _kinematics(description: Description, at: Ints) -> tuple[Ints, Ints, dict[st
     number = 0
     for k in description.families_of("q"):
         family = description.families[k]
+        # a model that is not closed
         if family.owner not in flows:
             raise ContractError(f"coordinate {family.owner} has a displacement and no flow")
         flow = flows[family.owner]
+        # shapes of both must agree
         if description.families[flow].size != family.size:
             raise ContractError(f"coordinate {family.owner}: displacement and flow differ in size")
         first[family.owner] = number
         number += family.size
         places_q.append(np.arange(family.size) + at[k])
         places_f.append(np.arange(family.size) + at[flow])
+    # a model without coordinates
     if not places_q:
         return np.zeros(0, np.int32), np.zeros(0, np.int32), first
     return np.concatenate(places_q).astype(np.int32), np.concatenate(places_f).astype(np.int32), first
@@ -239,12 +250,15 @@ def _level_calls(
     found: list[Planned] = []
     for call in calls:
         mine = [k for k in range(call.to.size) if call.to[k] >= 0]
+        # blocks without derived constraints stay
         if call.block not in UNDERIVED or not level & set(mine):
             found.append(call)
             continue
+        # the underived block and the derived one, each with its own rows
         for block, kept in ((call.block, False), (UNDERIVED[call.block], True)):
             to = call.to.copy()
             for k in mine:
+                # wanted here, or out of the way behind all others
                 if (k in level) != kept:
                     to[k] = number
                     number += rows[k].size
@@ -267,6 +281,7 @@ def _stretches(q: Ints, f: Ints) -> Ints:
 def plan(description: Description, name: str) -> Form:
     """The calls and tables of one index form."""
     own = START if name == "start" else ()
+    # places of unknowns as written; audits behind
     at, kind, written, extended = _layout(description, (*own, "audit"))
     unknowns = written
     if "kinematics" not in description.layouts:  # the same in every form
@@ -274,6 +289,7 @@ def plan(description: Description, name: str) -> Form:
         few = made[:2] if made[0].size <= FEW else None  # of a large model the room counts
         description.layouts["kinematics"] = int(made[0].size), _stretches(*made[:2]), few, made[2]
     kinematics, k_span, k_few, first = description.layouts["kinematics"]
+    # forms without rows q' - f
     bare = name in BARE
     if bare:
         nothing = np.zeros(0, dtype=np.int32)
@@ -283,17 +299,22 @@ def plan(description: Description, name: str) -> Form:
     nu = at.copy()
     tables: dict[str, Ints] = {}
     groups: list[tuple[str, int, int]] = []
+    # phi', where the stabilised form projects with nu
     calls: list[Planned] = []
     scales: list[Planned] = []
     stabilised = name == "2" and "phi" in description.blocks
     normal = "phi_normal" if "phi_normal" in description.blocks else "phi_reaction"
+    # "2/3,5": families whose constraints stay underived
     base, _, kept = name.partition("/")
     level = {int(k) for k in kept.split(",")} if kept else set[int]()
     for block, group in FORMS[base]:
+        # a block that this model, or this form, has not
         if block not in description.blocks or (group in ("kinematics", "phi_rate") and name == "2" and not stabilised):
             continue
+        # nu act through one block alone
         if group == "kinematics" and block != normal:
             continue
+        # the first block of a group lays out its rows
         if group != "kinematics" and group not in tables:
             tables[group] = np.full(len(description.rows), NOWHERE, dtype=np.int32)
             for k in description.rows_of(group):
@@ -308,6 +329,7 @@ def plan(description: Description, name: str) -> Form:
             calls.append(Planned(block, nu, _stabilised_places(description.rows, BASE.get(block, block), first)))
         else:
             calls.append(Planned(block, at, tables[group]))
+            # a steep law has a block of magnitudes
             if block + SCALE in description.blocks:
                 scales.append(Planned(block + SCALE, at, tables[group]))
     # unknowns of a start behind those of the form

@@ -41,10 +41,12 @@ def _rows_of(description: Description, form: Form, places: LeftOut) -> Iterator[
     """Of multipliers: number, each group of rows, the unknown that it reads, the places of both."""
     first, families = {(group, k): at for group, k, at in form.groups}, description.families
     row = {family: multiplier_row(description, family) for family in dict(places)}
+    # kappa stands for itself and, in the stabilised form, for nu
     for number, (family, position) in enumerate(places):
         at = {families[family].kind: int(form.at[family])}
         if "kappa" in at:
             at["nu"] = nu_place(description, form, family)
+        # rows in which this form reads the multiplier
         for group, read in _HELD[form.base]:
             if at.get(read, -1) >= 0 and (group, row[family]) in first:
                 yield number, group, read, first[group, row[family]] + position, at[read] + position
@@ -52,6 +54,7 @@ def _rows_of(description: Description, form: Form, places: LeftOut) -> Iterator[
 
 def held_rows(description: Description, form: Form, left_out: LeftOut) -> tuple[Longs, Longs]:
     """Rows, and the unknowns that vanish there."""
+    # of several rows for one multiplier the last one
     own = {} if form.base == "constraints" else {read: group for group, read in _HELD[form.base]}  # the last of each
     found = [(row, at) for _, group, read, row, at in _rows_of(description, form, left_out) if own.get(read) == group]
     table = np.asarray(found, dtype=np.int64).reshape(-1, 2)
@@ -60,6 +63,7 @@ def held_rows(description: Description, form: Form, left_out: LeftOut) -> tuple[
 
 def multiplier_row(description: Description, family: int) -> int:
     """The row family of the constraint of a family of multipliers."""
+    # kappa belong to phi, mu to psi
     item = description.families[family]
     block = "phi" if item.kind == "kappa" else "psi"
     rows_of = ((k, description.rows[k]) for k in description.rows_of(block))
@@ -68,6 +72,7 @@ def multiplier_row(description: Description, family: int) -> int:
 
 def nu_place(description: Description, form: Form, family: int) -> int:
     """Where the nu of a constraint stand (behind the unknowns as written, in the order of the kappa); -1: nowhere."""
+    # forms without nu
     if form.unknowns == form.written:
         return -1
     before = sum(description.families[k].size for k in description.families_of("kappa") if k < family)
@@ -76,6 +81,7 @@ def nu_place(description: Description, form: Form, family: int) -> int:
 
 def switch_rows(description: Description, form: Form) -> tuple[Longs, Longs, Longs, Longs]:
     """Rows, the unknowns that vanish there, the numbers of their switches; 1 where their derivative does."""
+    # forms in which rates of multipliers are unknowns
     rates = _RATES.get(form.name, {}) if "dynamics_rate" in description.blocks else {}
     rows = _rows_of(description, form, description.switches.places)
     found = [(row, at, number, int(rates.get(read) == group)) for number, group, read, row, at in rows]

@@ -31,6 +31,7 @@ def own_unknown(system: System, group: str, kind: str) -> Ints:
     families = system.description.families
     own = {family.owner: k for k, family in enumerate(families) if family.kind == kind}
     place = np.full(system.rows, -1, dtype=np.int32)
+    # rows of the group, coordinate by coordinate
     for name, family, first in system.form.groups:
         row = system.description.rows[family]
         unknown = own.get(row.owner)
@@ -45,9 +46,11 @@ def own_inertia(system: System, jy: Floats | None, jyd: Floats) -> Floats:
     jy, jyd [entries]: dF/dy, dF/dyd; jy None: of a system without momenta.
     """
     found = _own(system, jyd, "dynamics", "f")
+    # without momenta M stands in the balances
     if jy is None:
         return found
     by_flow, by_momentum = _own(system, jy, "momentum", "f"), _own(system, jy, "momentum", "p")
+    # p = M f: the slope by the flow over that by the momentum
     momenta, flows = with_flows(system)
     one, other = by_flow[flows], by_momentum[momenta]
     found[flows] -= np.divide(one, other, out=np.zeros_like(one), where=other != 0.0)
@@ -62,6 +65,7 @@ class Inertia:
     def __init__(self, system: System, jy: Floats, jyd: Floats) -> None:
         moving = system.are("f")
         self.size = int(moving.sum())
+        # flows by number; momenta by the number of their flow
         flow = np.where(moving, np.cumsum(moving) - 1, -1)
         momentum = np.full(system.unknowns, -1, dtype=np.int64)
         momenta, flows = with_flows(system)
@@ -70,6 +74,7 @@ class Inertia:
         columns = system.pattern.columns_of()
 
         def entries(group: str, unknown: NDArray[np.int64], values: Floats) -> Entries:
+            # entries whose row belongs to a coordinate and whose column is a flow or its momentum
             own = own_unknown(system, group, "f")[system.pattern.row]
             column = unknown[columns]
             take = (own >= 0) & (column >= 0)
@@ -88,21 +93,25 @@ class Inertia:
         determine their flows.
         """
         number, s = members.shape
+        # which group each flow is in, and where in it
         group, place = np.full(self.size, -1, dtype=np.int64), np.zeros(self.size, dtype=np.int64)
         group[members], place[members] = np.arange(number)[:, None], np.arange(s)
 
         def block(entries: Entries) -> Floats:
             i, j, values = entries
+            # entries within one group
             take = (group[i] >= 0) & (group[i] == group[j])
             found = np.zeros((number, s, s))
             np.add.at(found, (group[i[take]], place[i[take]], place[j[take]]), values[take])
             return found
 
         slopes = block(self.by_momentum)
+        # a flow without momentum has 1 there
         k, at = np.nonzero(self.without[members])
         slopes[k, at, at] = 1.0
         try:
             carried = np.linalg.solve(slopes, block(self.by_flow))
+        # momenta that do not determine their flows
         except np.linalg.LinAlgError:
             return np.full((number, s, s), np.nan)
         return np.asarray(block(self.balances) - carried)
@@ -112,15 +121,18 @@ class Inertia:
         mine = np.zeros(self.size, dtype=bool)
         mine[members] = True
         own = np.ones(self.size)
+        # a momentum given by several rows
         i, j, values = self.by_momentum
         if (values[(i != j) & mine[i]] != 0.0).any():
             return False
         own[i[i == j]] = values[i == j]
+        # sums over the balances of these flows, and sizes of their terms
         total, size = np.zeros(self.size), np.zeros(self.size)
         for (i, j, values), over in ((self.balances, None), (self.by_flow, own)):
             part = values if over is None else -values / over[i]
             np.add.at(total, j[mine[i]], part[mine[i]])
             np.add.at(size, j[mine[i]], np.abs(part[mine[i]]))
+        # nothing but round-off: they move together without inertia
         return bool((np.abs(total) <= CANCELS * size).all())
 
 
@@ -129,10 +141,12 @@ def flows_joined(system: System) -> NDArray[np.bool_]:
     columns, flows = system.pattern.columns_of(), system.are("f")
     in_y, in_rate = system.structural()
     momenta, own_flow = with_flows(system)
+    # momenta count as their flows
     flow = np.where(flows, np.arange(system.unknowns, dtype=np.int32), np.int32(-1))
     flow[momenta] = own_flow
     found = np.zeros(system.unknowns, dtype=bool)
     for group, there, moving in (("dynamics", in_rate, flows), ("momentum", in_y, flow >= 0)):
+        # entries that join two coordinates
         at = np.flatnonzero(there & moving[columns])
         own, other = own_unknown(system, group, "f")[system.pattern.row[at]], flow[columns[at]]
         apart = (own >= 0) & (own != other)
@@ -146,8 +160,10 @@ def stored_between(system: System, common: Ints) -> Ints:
     """
     own = own_unknown(system, "dynamics", "f")[system.pattern.row]
     column = system.pattern.columns_of()
+    # a rate that stands in another coordinate's balance
     there = system.structural()[1] & (own >= 0) & (own != column)
     there &= (common[own] >= 0) & (common[own] == common[column])
+    # each pair once
     pairs = np.sort(np.stack([own[there], column[there]], axis=1), axis=1)
     return np.unique(pairs, axis=0)
 
@@ -180,6 +196,7 @@ def _own_places(system: System, group: str, kind: str) -> NDArray[np.int64]:
 
 def with_flows(system: System) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
     """Places of momenta, and of the flows of the same coordinates."""
+    # coordinates that have both
     families = list(zip(system.description.families, system.form.at, strict=False))
     flow = {family.owner: first for family, first in families if family.kind == "f"}
     paired = [(family, first) for family, first in families if family.kind == "p" and family.owner in flow]

@@ -27,9 +27,11 @@ class Layout:
 
 def laid_out(description: Description, form: Form, left_out: LeftOut) -> Layout:
     """Pattern and slots of a form without these constraints."""
+    # rows q' - f, then the entries of each block
     parts = [Places(form.k_row, form.k_q), Places(form.k_row, form.k_f)]
     for call in form.calls:
         parts += entries_of(description, call)
+    # rows of multipliers that are left out, or may not hold
     held = held_rows(description, form, left_out)
     times = switch_rows(description, form)
     parts.append(Places(np.concatenate([held[0], times[0]]), np.concatenate([held[1], times[1]])))
@@ -37,6 +39,7 @@ def laid_out(description: Description, form: Form, left_out: LeftOut) -> Layout:
     parts = [join(parts)]  # of a large one the room counts
     pattern, (number,) = compress(form.rows, form.unknowns, parts)
     slots = [np.ascontiguousarray(piece) for piece in np.split(number, np.cumsum(sizes)[:-1])]
+    # -1: left out for good; else the number of its switch
     place = np.concatenate([np.full(held[0].size, -1), times[2]])
     reads_rate = np.concatenate([np.zeros(held[0].size), times[3]]).astype(np.int32)
     at_times = last.row.astype(np.int32), last.column.astype(np.int32), slots[-1].copy(), place

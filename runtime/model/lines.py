@@ -35,6 +35,7 @@ def stretches_of(
     at = 0
     for number, width in shapes:
         ends = _ends(places, same, at, number, width)
+        # hardly longer than lines by themselves: not worth it
         if FEW * len(ends) > number + FEW:
             return None
         for low, high in zip([0, *ends[:-1]], ends, strict=True):
@@ -46,10 +47,12 @@ def stretches_of(
 def _ends(places: Sequence[Ints], same: Floats | None, at: int, number: int, width: int) -> list[int]:
     """Behind which lines the stretches end."""
     part = slice(at, at + number * width)
+    # a stretch ends where the step changes, or where values do
     other, apart = np.zeros((2, max(number - 1, 0)), dtype=bool)  # between each line and the next
     for place in places:
         steps = np.diff(place[part].reshape(number, width), axis=0)
         other[1:] |= (steps[1:] != steps[:-1]).any(axis=1)
+    # bit for bit: -0.0 is not 0.0
     if same is not None:
         bits = same[part].view(np.int64).reshape(number, width)
         apart |= (bits[1:] != bits[:-1]).any(axis=1)
@@ -58,6 +61,7 @@ def _ends(places: Sequence[Ints], same: Floats | None, at: int, number: int, wid
         if apart[mark] or mark > begin:  # the step behind the first line of a stretch is its own
             begin = mark + 1
             found.append(begin)
+            # too many: nobody asks for the rest
             if FEW * len(found) > number + FEW:
                 break
     return [*found, number] if number else []
@@ -67,5 +71,6 @@ def table(place: Ints, stretch: Stretch) -> tuple[NDArray[np.int32], NDArray[np.
     """Places of the first line of a stretch and the step to the next [width]."""
     at, number, width = stretch
     first = np.array(place[at : at + width], dtype=np.int32)
+    # one line has no step
     step = place[at + width : at + 2 * width] - first if number > 1 else np.zeros(width)
     return first, np.asarray(step, dtype=np.int32)

@@ -24,9 +24,11 @@ def own_rows(system: System) -> Ints:
     """
     form = system.form
     own = np.full(system.unknowns, -1, dtype=np.int32)
+    # a balance belongs to its displacement, a momentum's row to the momentum
     for group, kind in (("dynamics", "q"), ("momentum", "p")):
         unknown = own_unknown(system, group, kind)
         own[unknown[unknown >= 0]] = np.flatnonzero(unknown >= 0)
+    # q' = f tells the flow
     own[form.k_f] = form.k_row
     _constraints(system, own)
     return own
@@ -38,6 +40,7 @@ def own_rows_of_rates(system: System) -> Ints:
     columns = pattern.columns_of()
     own = np.full(system.unknowns, -1, dtype=np.int32)
     for group, kind in _BALANCES:
+        # a row that reads the rate of its own unknown
         mine = rated & (own_unknown(system, group, kind)[pattern.row] == columns)
         own[columns[mine]] = pattern.row[mine]
     return own
@@ -47,6 +50,7 @@ def _constraints(system: System, own: Ints) -> None:
     """The rows of multipliers [unknowns]."""
     form, description = system.form, system.description
     for kind, groups in _CONSTRAINTS:
+        # a constraint belongs to its multiplier
         family_of = {description.families[k].owner: k for k in description.families_of(kind)}
         for group, row, first in form.groups:
             found = description.rows[row]

@@ -68,7 +68,9 @@ def _value(index: Index, columns: list[Longs], number: int, ix: Ints) -> Longs:
     """Value of an index in each iteration [number]."""
     loop, slot, constant, *table = index
     base = constant + (int(ix[slot]) if slot >= 0 else 0)
+    # no loop: one value; else the loop's, moved
     value = np.full(number, base, dtype=np.int64) if loop < 0 else columns[loop] + base
+    # tables of indices, one after the other: nodes[i]
     for place in table:
         value = ix[ix[place] + value].astype(np.int64)
     return value
@@ -77,9 +79,11 @@ def _value(index: Index, columns: list[Longs], number: int, ix: Ints) -> Longs:
 def _iterations(kernel: Kernel, ix: Ints) -> list[Longs]:
     """Value of each loop variable in each iteration, last loop fastest; inner bounds may follow outer loops."""
     columns: list[Longs] = []
+    # from the outermost loop inwards
     for first, last in kernel.loops:
         number = columns[0].size if columns else 1
         low = _value(first, columns, number, ix)
+        # an empty inner loop has no iterations
         count = np.maximum(_value(last, columns, number, ix) - low + 1, 0)
         start = np.cumsum(count) - count
         inner = np.arange(int(count.sum()), dtype=np.int64) + np.repeat(low - start, count)
@@ -95,10 +99,12 @@ def iterations(kernel: Kernel, ix: Ints) -> int:
 def _positions(reference: Reference, shape: Shape, loops: list[Longs], number: int, ix: Ints) -> Longs:
     """Row-major position in its family in each iteration [number]."""
     position: Longs | None = None
+    # a manifest that does not fit the binding
     if len(reference.indices) != len(shape):
         raise ContractError(f"a reference with {len(reference.indices)} indices into a family with {len(shape)}")
     for index, (first, last) in zip(reference.indices, shape, strict=True):
         value = _value(index, loops, number, ix)
+        # an index out of its family would read elsewhere
         if number and (value.min() < first or value.max() > last):
             raise ContractError(f"an index runs over {value.min()}..{value.max()} outside {first}..{last}")
         value -= first
@@ -111,6 +117,7 @@ def _place(reference: Reference, shape: Shape, ix: Ints) -> int:
     position = 0
     if len(reference.indices) != len(shape):
         raise ContractError(f"a reference with {len(reference.indices)} indices into a family with {len(shape)}")
+    # as `_positions`, with one number
     for index, (first, last) in zip(reference.indices, shape, strict=True):
         _, slot, constant, *table = index
         value = constant + (int(ix[slot]) if slot >= 0 else 0)
@@ -137,14 +144,17 @@ def places(
     all_columns: list[Ints] = []
     for kernel in kernels:
         entries = kernel.dy if which == "dy" else kernel.dyd
+        # a block without slopes by these
         if not entries:
             continue
+        # a scalar: numbers are enough
         if not kernel.loops:
             for side, into in ((0, all_rows), (1, all_columns)):
                 at, boxes = tables[side], shapes[side]
                 own = [int(at[p[side].family]) + _place(p[side], boxes[p[side].family], ix) for p in entries]
                 into.append(np.array(own, dtype=np.int32))
             continue
+        # in a loop: arrays, entries of one iteration one behind the other
         loops = _iterations(kernel, ix)
         number = loops[0].size
         for side, into in ((0, all_rows), (1, all_columns)):
@@ -168,8 +178,10 @@ def spared_loops(
     """
     found = np.zeros(len(kernels), dtype=np.int32)
     for k, kernel in enumerate(kernels):
+        # None: it does not say which rows it adds to
         if kernel.rows:
             sizes = ((row, int(to[row.family]), count(shapes[row.family])) for row in kernel.rows)
+            # families of which some row is read
             some = [(row, first) for row, first, size in sizes if read[first : first + size].any()]
             loops = _iterations(kernel, ix) if some else []
             number = loops[0].size if loops else 0
@@ -180,6 +192,7 @@ def spared_loops(
 
 def join(parts: Sequence[Places]) -> Places:
     """All parts one behind the other (int32)."""
+    # nothing to join
     if len(parts) == 1:
         return Places(*(np.asarray(item, dtype=np.int32) for item in (parts[0].row, parts[0].column)))
     empty = np.zeros(0, dtype=np.int32)
@@ -194,8 +207,10 @@ def compress(rows: int, unknowns: int, parts: Sequence[Places]) -> tuple[Pattern
     """One pattern that holds all parts, and for each part the place of each of its entries (int32)."""
     one = join(parts)
     row, column = one.row, one.column
+    # beyond the matrix: a manifest that does not fit
     if row.size and (row.min() < 0 or row.max() >= rows or column.min() < 0 or column.max() >= unknowns):
         raise ContractError("an entry lies outside the matrix")
+    # sorted by columns, equal places once
     number, starts, own = number_pairs(column, row, unknowns, rows)
     cuts = np.cumsum([part.row.size for part in parts])[:-1]
     slots = [np.ascontiguousarray(piece) for piece in np.split(number, cuts)]
@@ -213,6 +228,7 @@ def number_pairs(
     pair = tuple(np.ascontiguousarray(item, dtype=np.int32) for item in (first, second))
     arrays = map(lib.pointer, (*pair, number, start, each))
     count = lib.core.sd_pairs(number.size, max(firsts, 1), max(seconds, 1), *arrays)
+    # the core found no memory
     if count < 0:
         raise MemoryError
     return number, start[: firsts + 1], each[:count].copy()

@@ -61,14 +61,17 @@ def sizing(system: System) -> Sizing:
 
 
 def _sizing(system: System) -> Sizing:
+    """The tables from which the core finds magnitudes: balance, kinds, own entries of coordinates, displacements."""
     rows, nominal = balance(system), system.named
     kind, own = _kinds(system), [places.astype(np.int32) for places in own_places(system)]
     effort, moved = (item.astype(np.int32) for item in _rows_of_displacements(system))
+    # a momentum's size is that of its flow, by its inertia
     partner = None
     if system.are("p").any():
         partner = np.full(system.unknowns, -1, dtype=np.int32)
         momenta, flows = with_flows(system)
         partner[momenta] = flows
+    # arrays are kept as long as the structure points to them
     arrays = nominal, kind, partner, *own, effort, moved
     core = lib.Sizing(
         balance=rows.address,
@@ -96,6 +99,7 @@ def _kinds(system: System) -> Ints:
         _with_momentum(system),
         *(system.are(kind) for kind in ("q", "p", "s")),
     )
+    # one bit for each property
     found = np.zeros(system.unknowns, dtype=np.int32)
     for k, mask in enumerate(masks):
         found |= mask.astype(np.int32) << k
@@ -117,6 +121,7 @@ def _rows_of_displacements(system: System) -> tuple[NDArray[np.int64], NDArray[n
     for group, family, first in form.groups:
         owner = description.rows[family].owner
         number = description.rows[family].size
+        # balances of coordinates that have displacements
         if group == "dynamics" and owner in places and description.families[places[owner]].size == number:
             rows.append(first + np.arange(number))
             columns.append(form.at[places[owner]] + np.arange(number))
@@ -136,6 +141,7 @@ def _groups(system: System) -> tuple[Ints, Ints]:
 
 def _alike(system: System) -> tuple[Ints, Ints]:
     families, numbers = system.description.families, kinds_and_units(system)
+    # nu have a number of their own
     number = [*(numbers[family.kind, family.unit] for family in families), len(numbers)]
     every = np.array(number, dtype=np.int32)[system.family_of]
     begin = np.flatnonzero(np.diff(every, prepend=-1)).astype(np.int32)
@@ -157,8 +163,9 @@ def group_maximum(system: System, values: Floats) -> Floats:
 
 
 def group_maxima(system: System, values: Floats) -> Floats:
-    """The same of each kind and unit, by its number in `alike`; zero at least."""
+    """Largest absolute value of each kind and unit, by its number in `alike`; zero at least."""
     numbers, families, (first, which) = kinds_and_units(system), system.description.families, system.begins
+    # nu stand behind the unknowns as written
     of = [*(numbers[families[k].kind, families[k].unit] for k in which), len(numbers)]  # nu behind the others
     more = system.unknowns > system.form.written
     begin = np.append(first, np.int32(system.form.written))[: first.size + more]
@@ -172,6 +179,7 @@ def round_off_beside(system: System, magnitude: Floats) -> Floats:
     """What is left of a zero beside the largest unknown of its unit [observed values]."""
     description, largest = system.description, dict[str, float]()
     for (_, unit), most in zip(kinds_and_units(system), group_maxima(system, magnitude), strict=False):
+        # over all kinds of one unit: a force beside reactions
         largest[unit] = max(float(most), largest.get(unit, 0.0))
     rows = [description.rows[k] for k in description.rows_of("observe")]
     sizes = [ROUND_OFF * largest.get(row.unit, 0.0) for row in rows]
@@ -180,16 +188,19 @@ def round_off_beside(system: System, magnitude: Floats) -> Floats:
 
 def largest_of_group(group: NDArray[np.integer], values: Floats) -> Floats:
     """Of each value the largest of its group [values]; zero at least.  Groups lie in stretches, for families do."""
+    # reduceat refuses empty arrays
     if not group.size:
         return np.zeros(0)
     new = np.ones(group.size, dtype=bool)
     np.not_equal(group[1:], group[:-1], out=new[1:])
+    # stretches of one group
     begin = np.flatnonzero(new)
     return _largest(begin, group[begin], values)
 
 
 def _largest(begin: NDArray[np.integer], of: NDArray[np.integer], values: Floats) -> Floats:
     largest = np.zeros(int(of.max(initial=-1)) + 1)
+    # the largest of each stretch, then of its group
     if begin.size:
         np.maximum.at(largest, of, np.maximum.reduceat(values, begin))
     return np.repeat(largest[of], np.diff(begin, append=values.size))
@@ -210,6 +221,7 @@ def unresolved_sizes(system: System, y: Floats, jy: Floats) -> Floats:
     """
     found = np.zeros(system.unknowns)
     arrays = map(lib.pointer, (_holding(system), np.ascontiguousarray(y), jy, found))
+    # the core found no memory
     if lib.core.sd_unresolved(c.byref(system.core), *arrays):
         raise MemoryError
     return found
@@ -226,6 +238,7 @@ def noise(system: System, pattern: Pattern, y: Floats, jy: Floats, time: float) 
     go of it.
     """
     found, (bare, _held) = np.zeros(system.unknowns), system.bare(pattern)
+    # flags of what stands where, the point, its slopes
     arrays = map(lib.pointer, (*noisy(system), np.ascontiguousarray(y), jy))
     if lib.core.sd_noise(c.byref(bare), *arrays, time, SWEEPS, GROUP, lib.pointer(found)):
         raise MemoryError
@@ -263,9 +276,11 @@ def magnitudes(
     del y  # of a large system the room counts
     b = system._read(_finite(yd))
     found, tau = np.zeros(system.unknowns), np.zeros(1)
+    # without a linearised motion the core goes by rates
     motion = (None, None, None, None) if far is None else (*map(lib.pointer, far[:3]), far[3])
     answers = lib.pointer(found), lib.pointer(tau)
     tables = sizing(system)
+    # the room counts
     if system.unknowns > LARGE:
         system.spare()
     core = c.byref(tables.core), c.byref(system.core)

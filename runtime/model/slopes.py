@@ -32,8 +32,10 @@ WITH_A_SLOPE = "a law with a slope at rest, as of a laminar part (f*hypot(f, f0)
 
 def no_slope(rows: Sequence[RowLabel], where: str = "this state") -> str:
     """That these laws have no slope there, for a reader."""
+    # at most three are named
     names = list(dict.fromkeys(row.label.removesuffix(".law") for row in rows))
     laws = f"the law at {names[0]} has" if len(names) == 1 else f"the laws at {', '.join(names[:3])} have"
+    # what all of them do, if they do the same
     does = {row.slope for row in rows}
     what = does.pop() if len(does) == 1 and "" not in does else "vanishes, or grows without bound,"
     return f"{laws} no slope at {where} (it {what} where nothing flows): no rate follows"
@@ -42,8 +44,10 @@ def no_slope(rows: Sequence[RowLabel], where: str = "this state") -> str:
 def without_slope(system: System, t: float, y: Floats, yd: Floats, size: Floats | None = None) -> tuple[RowLabel, ...]:
     """Labels of `rows_without_slope`, with what each slope does."""
     falls, rises = _bent(system, t, y, yd, size)
+    # a slope that vanishes: q = sqrt(dp) read backwards
     found = {row: replace(system.row_label(row), slope=_FALLS) for row in falls.tolist()}
     for row in rises.tolist():
+        # one that does both is called neither
         found[row] = replace(system.row_label(row), slope="" if row in found else _RISES)
     return tuple(dict.fromkeys(found[row] for row in sorted(found)))
 
@@ -72,17 +76,21 @@ def _bent(
     """
     row, column = system.pattern.row, system.pattern.columns_of()
     algebraic = np.isin(system.kinds, ("f", "e"))
+    # unknowns without inertia: flows and efforts whose rates occur nowhere
     told = algebraic.copy()
     algebraic[column[system.structural()[1]]] = False
     size = group_maximum(system, np.abs(y)) if size is None else size
+    # no two unknowns move alike, so that differences do not cancel
     size = np.where(size > NONE, size, 1.0) * (1.0 + 0.1 * (np.arange(y.size) % 7))
     seen = np.zeros(row.size, dtype=np.int64)
     falls, rises = algebraic[column], (told if steep else algebraic)[column]
     with np.errstate(all="ignore"):
         before: Floats | None = None
+        # ever smaller steps from zero: a slope that keeps falling, or rising, has no limit
         for part in LADDER:
             slope = np.abs(system.jacobian(t, y + part * size, yd)[0])
             beyond = (part * size > np.abs(y))[column]
+            # between two steps, both far beyond the value itself
             if before is not None:
                 falls = falls & (~beyond | (slope < FALLS * before))
                 rises = rises & (~beyond | ((slope > before / FALLS) & (before > 0.0)))

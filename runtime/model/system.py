@@ -45,17 +45,19 @@ class System(Facts):
     def from_description(
         cls, description: Description, carrier: Carrier, index_form: str, left_out: LeftOut = ()
     ) -> System:
-        """The same from a description; left_out: multipliers (family, position) of constraints that do not count.
+        """A system of a description; left_out: multipliers (family, position) of constraints that do not count.
 
         Where the description has the systems of a run before it, one of those, at this one's numbers; else one that
         somebody has, unless a run gave its rows q' - f factors.
         """
         made = description.alive if description.systems is None else description.systems
         self = made.get((index_form, left_out))
+        # none, or one that another run may still use with factors
         if self is None or self.carrier is not carrier or (description.systems is None and index_form == "2"):
             self = cls.__new__(cls)
             self._make(description, carrier, index_form, left_out)
             made[index_form, left_out] = self
+        # one of the last run, at these numbers
         elif description.systems is not None:
             self.description = description
             if index_form == "2":
@@ -63,15 +65,15 @@ class System(Facts):
         return self
 
     def another(self, index_form: str) -> System:
-        """The same model in another form."""
+        """The model in another form."""
         return System.from_description(self.description, self.carrier, index_form, self.left_out)
 
     def without_constraints(self, left_out: LeftOut) -> System:
-        """The same form, these constraints left out."""
+        """The system of one form without these constraints."""
         return System.from_description(self.description, self.carrier, self.form.name, left_out)
 
     def of_blocks(self, index_form: str) -> System:
-        """The same model in another form for `rows_at` alone: nothing of its Jacobian is laid out."""
+        """The model in another form for `rows_at` alone: nothing of its Jacobian is laid out."""
         found = System.__new__(System)
         found._plan(self.description, self.carrier, index_form, self.left_out)
         return found
@@ -79,8 +81,10 @@ class System(Facts):
     def own_numbers(self) -> None:
         """From now on its p is its own, which may be written into."""
         old = self.description
+        # writable: its own already
         if old.p.flags.writeable:
             return
+        # caches are those of the shared numbers: empty ones
         own = replace(old, p=old.p.copy(), alive=WeakValueDictionary(), room=[])
         self._make(own, self.carrier, self.form.name, self.left_out)
         own.alive[self.form.name, self.left_out] = self
@@ -88,6 +92,7 @@ class System(Facts):
     def _plan(self, description: Description, carrier: Carrier, index_form: str, left_out: LeftOut) -> None:
         self.description, self.carrier, self.left_out = description, carrier, left_out
         key = "plan", index_form
+        # the plan of a form is kept with the description
         if key not in description.layouts:
             description.layouts[key] = plan(description, index_form)
         self.form: Form = description.layouts[key]
@@ -118,12 +123,15 @@ class System(Facts):
         """Lets go of the pattern, found again when it is asked for; whole: of the places of the Jacobian's entries too.
         Nobody may hold addresses of what goes.
         """
+        # kept for runs that follow
         if self.description.systems is not None:
             return
         self.description.layouts.pop(self._layout_key, None)
         self._layout, self._away = None, whole
+        # addresses of what goes are cleared
         self._core.column = self._core.row = None
         self._kinematics(())
+        # places of entries go too
         if whole:
             self._slots = []
             self._place_entries(_NOWHERE)
@@ -148,21 +156,26 @@ class System(Facts):
         return self.form.name, self.left_out
 
     def _assemble(self) -> None:
+        """Makes the core's structure: calls of blocks, magnitudes of steep laws, room, rows that may not hold."""
         form, layout = self.form, self._laid_out()
+        # each block with its tables, and how many entries it writes
         calls = (lib.Call * max(len(form.calls), 1))()
         for k, call in enumerate(form.calls):
             sizes = (int(slots.size) for slots in layout.slots[2 * k + 2 : 2 * k + 4])
             calls[k] = self.call(call.block, call.at, call.to, form.rows, *sizes)
         self.calls = calls
+        # blocks of magnitudes have no slopes
         scales = (lib.Call * max(len(form.scales), 1))()
         for k, scale in enumerate(form.scales):
             scales[k] = self.call(scale.block, scale.at, scale.to, form.rows)
         self._scales = scales
+        # the stabilised form weighs its rows q' - f
         ones = np.broadcast_to(1.0, form.kinematics)
         self.kinematic_scale: Floats = ones.copy() if form.name == "2" else ones
         self.work = self._work(layout.entries)
         self._keep += [calls]
         self._reads_rate, self._may_hold = layout.reads_rate, layout.may_hold
+        # kernels that say of themselves that nothing of them moves with time
         blocks = self.description.blocks
         planned = [kernel for call in form.calls for kernel in blocks.get(call.block, ())]
         self._core = lib.System(
@@ -210,14 +223,18 @@ class System(Facts):
     @property
     def core(self) -> lib.System:
         """The core's structure."""
+        # let go by `put_away`
         if self._layout is None:
             self._bring_back()
         return self._core
 
     def bare(self, pattern: Pattern | None = None) -> tuple[lib.System, tuple[Ints, ...]]:
-        """The same where nothing asks for the places of entries, and what it reads: rows q' - f, this pattern."""
+        """The core's structure where nothing asks for the places of entries, and what it reads: rows q' - f, this
+        pattern.
+        """
         made, arrays = lib.System.from_buffer_copy(self._core), (self.form.k_q, self.form.k_f)
         made.k_q, made.k_f = map(lib.pointer, arrays)
+        # a pattern that someone else still has
         if pattern is not None:
             made.column, made.row = lib.pointer(pattern.column), lib.pointer(pattern.row)
         return made, arrays
@@ -234,8 +251,10 @@ class System(Facts):
         if self.unknowns > LARGE:
             return None
         room = self.description.room
+        # larger than any before: all systems get the larger room
         if not room or room[0].size < entries:
             room[:] = [np.zeros(entries)]
+            # addresses of the old room are renewed
             for system in (one for one in self.description.alive.values() if one.work is not None):
                 system.work, system._core.v = room[0], lib.pointer(room[0])
         return room[0]
@@ -243,6 +262,7 @@ class System(Facts):
     def switch(self) -> None:
         """Rows of constraints that do not hold read "multiplier = 0"."""
         key = self.description.switches.active.tobytes()
+        # active sets are remembered, up to so many
         if key not in self._sets:
             if len(self._sets) >= SETS:
                 self._sets.clear()
@@ -255,9 +275,11 @@ class System(Facts):
 
     def _set_of_rows(self) -> tuple[Any, Any]:
         """Arrays of the present active set, and their addresses."""
+        # left out for good, or not active
         rows, unknowns, slots, number = self._may_hold
         now = (number < 0) | ~np.append(self.description.switches.active, True)[number]
         row, unknown = rows[now], unknowns[now]
+        # entries of these rows are cleared
         cleared = np.flatnonzero(np.isin(self.pattern.row, row)).astype(np.int32)
         held = row, unknown, slots[now].copy(), self._reads_rate[now], cleared
         return held, tuple(map(lib.pointer, held))
@@ -291,6 +313,7 @@ class System(Facts):
     @property
     def slots(self) -> list[Ints]:
         """Places in the pattern of entries: of q', of f in the rows q' - f; dy, dyd of each call; of held rows."""
+        # let go by `put_away`
         if self._away:
             self._bring_back()
         return self._slots
@@ -304,10 +327,12 @@ class System(Facts):
         return self.once("structural", self._structural)
 
     def _structural(self) -> tuple[Mask, Mask]:
+        # entries of each call stand behind those of q' - f
         in_y, in_rate = np.zeros(self.pattern.entries, dtype=bool), np.zeros(self.pattern.entries, dtype=bool)
         for k in range(len(self.form.calls)):
             in_y[self.slots[2 * k + 2]] = True
             in_rate[self.slots[2 * k + 3]] = True
+        # rows of multipliers read them, or their rates
         in_y[self.slots[-1]] = True
         in_rate[self.slots[-1][self._reads_rate != 0]] = True
         return read_only(in_y), read_only(in_rate)
@@ -317,6 +342,7 @@ class System(Facts):
         return self.own(("observer", block), lambda: self._observer(block))
 
     def _observer(self, block: str) -> lib.Call | None:
+        # a model without that block
         if block not in self.description.blocks:
             return None
         table, number = self.observed_rows(block)
@@ -328,6 +354,7 @@ class System(Facts):
 
     def _powers(self) -> lib.Call | None:
         call = self._observer("audit")
+        # rows of energies: the first two and the first of each ledger
         if call is not None:
             to, number = self.observed_rows("audit")
             read = np.ones(number, dtype=bool)
@@ -350,6 +377,7 @@ class System(Facts):
     def _observed_rows(self, block: str) -> tuple[Ints, int]:
         table = np.full(len(self.description.rows), -1, dtype=np.int32)
         number = 0
+        # rows of a derived block are those of its base
         for k in self.description.rows_of(BASE.get(block, block)):
             table[k] = number
             number += self.description.rows[k].size
@@ -386,13 +414,16 @@ class System(Facts):
 
     def slopes(self, t: float, y: Floats, yd: Floats, *, rate: bool) -> Floats:
         """Values of dF/dy, or of dF/dyd [entries], as `jacobian` says them; of a large system in half the room."""
+        # small: both at once
         if self.unknowns <= LARGE:
             return self.jacobian(t, y, yd)[rate]
         found = np.empty(self.pattern.entries + 1)
         a, b = self._read(y), self._read(yd)
+        # the half that is not wanted first, to be overwritten
         for side in (not rate, rate):
             lib.core.sd_slopes(c.byref(self.core), t, lib.pointer(a), lib.pointer(b), side, lib.pointer(found))
             self.failure.check()
+            # slopes that are no numbers: `jacobian` takes those of a point beside
             if lib.core.sd_first_bad(self.pattern.entries, lib.pointer(found)) >= 0:
                 return self.jacobian(t, y, yd)[rate]
         return found[:-1]
@@ -411,6 +442,7 @@ class System(Facts):
         """Sums of the magnitudes of the terms of rows that hold a steep law [rows], rates as large as y; else 0."""
         found = np.zeros(max(self.rows, 1))
         at = self._buffer(y)
+        # each block of magnitudes adds to its rows
         for k in range(len(self.form.scales)):
             call = self._scales[k]
             function = lib.ROWS(call.rows)
@@ -421,6 +453,7 @@ class System(Facts):
     def _evaluate(self, block: str, t: float, y: Floats, yd: Floats) -> Floats:
         call = self.observer(block)
         number = self.observed_rows(block)[1]
+        # nothing observed
         if call is None:
             return np.zeros(number)
         out = np.zeros(max(number, 1))
@@ -433,6 +466,7 @@ class System(Facts):
         """R [rows] of one block alone at t, y, yd, added to out; at, to: places of families and of rows there."""
         t, y, yd = point
         call = self.call(block, np.ascontiguousarray(at), np.ascontiguousarray(to), out.size)
+        # a point that is extended already
         a, b = (x if x.size == self.form.extended else self._buffer(x) for x in (y, yd))
         lib.ROWS(call.rows)(c.addressof(call.frame), t, lib.pointer(a), lib.pointer(b), lib.pointer(out))
         del self._keep[-1]
@@ -442,6 +476,7 @@ class System(Facts):
     def observe(self, t: float, y: Floats, yd: Floats, audit: Mapping[str, float] | None = None) -> Floats:
         """Traced quantities (and sides of expects) at a point, in the order of their rows."""
         a, b = self._buffer(y[: self.form.written]), self._buffer(yd[: self.form.written])
+        # ledgers are read as if they were unknowns
         for k in self.description.families_of("audit"):
             family = self.description.families[k]
             a[self.form.at[k]] = (audit or {}).get(family.name.removeprefix("audit."), 0.0)
