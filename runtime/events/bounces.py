@@ -43,6 +43,7 @@ class Bounce:
 
 def is_thrown(t: float, value: float, speed: float, pull: float) -> Bounce:
     """A gap with its value, that opens at t (s) at a speed and is pulled back."""
+    # a parabola: height v^2 / 2a, flight 2v / a; without a pull back it ends nowhere
     back = speed > 0.0 and pull > 0.0
     height, flight = (0.5 * speed * speed / pull, 2.0 * speed / pull) if back else (np.inf, np.inf)
     return Bounce(min(value, 0.0), height, t, flight)
@@ -72,18 +73,22 @@ def flights(
     change.
     """
     (y, yd), step = point, PART * time
+    # the point a short step later; without one nothing is said of flights
     later = None
     with suppress(SolverFailure, NotFiniteError):
         later = restart.struck(t + step, y + step * yd, yd)
     if later is None:
         return []
+    # second differences: speed and pull of all rows
     now = observer(t, y, yd)
     one = observer(t + step, y + 0.5 * step * (yd + later[1]), later[1]) - now
     two = observer(t + 2.0 * step, y + 2.0 * step * later[1], later[1]) - now
     speed, pull = (4.0 * one - two) / (2.0 * step), (2.0 * one - two) / step**2
     found = []
+    # values are on the side they have fallen from
     for row, side in falls:
         bounce = is_thrown(t, side * float(now[row]), side * float(speed[row]), side * float(pull[row]))
+        # how long a flight takes whose height is only just seen
         if np.isfinite(bounce.flight):
             found.append((bounce, 2.0 * float(np.sqrt(2.0 * SEEN * observer.zero(row) / (side * pull[row])))))
     return found

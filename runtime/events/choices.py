@@ -33,6 +33,7 @@ class Choices:
     def begin(self, t: float, y: Floats, yd: Floats) -> None:
         """A piece of the motion begins at a point.  y, yd [unknowns as written]."""
         state = self._contacts.state()
+        # each active set is asked about once
         if state not in self._seen:
             self._begun[state] = self._idle(self._observer(t, y, yd))
 
@@ -42,16 +43,20 @@ class Choices:
         """
         contacts, state = self._contacts, self._contacts.state()
         begun = self._begun.pop(state, [])
+        # those that were idle at the begin and are idle at the end
         values = self._observer(t, y, yd) if begun else np.zeros(0)
         for k in set(begun) & set(self._idle(values)) if begun else ():
             if (state, k) in self._closed:
                 continue
+            # without contact k: what is then open, and between which contacts
             contacts.active[k] ^= True
             contacts.apply()
             directions, between = self._determined.directions(t, y, yd)
             contacts.become(state)
+            # nothing is open without it
             if not len(directions):
                 self._closed.add((state, k))
+            # something open that others decide
             elif not all(contacts.idle(i, values) for i in between):
                 self._seen.add(state)
                 self._add(t, (y, yd), directions, tuple(contacts.contacts[i].name for i in between))
@@ -64,8 +69,10 @@ class Choices:
     def _add(self, t: float, point: tuple[Floats, Floats], directions: Floats, between: tuple[str, ...]) -> None:
         """What is observed along the directions [number, unknowns as written]."""
         y, yd = point
+        # a move of anything, for comparison
         size = np.abs(y).max(initial=0.0) or 1.0
         anywhere = self._change(t, y, yd, size * normal(1, y.size)[0])
+        # an observed quantity that moves along an open direction is a choice
         for way in directions:
             change = self._change(t, y, yd, size * way / np.abs(way).max())
             for row in np.flatnonzero(change > SAME * anywhere).tolist():

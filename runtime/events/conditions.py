@@ -27,16 +27,19 @@ def holds(condition: Condition, sides: Floats, relations: Sequence[Relation], cr
     at this instant alone.
     """
     match condition[0]:
+        # of parts: by their own truth
         case "and":
             return all(holds(c, sides, relations, crossed) for c in condition[1:])
         case "or":
             return any(holds(c, sides, relations, crossed) for c in condition[1:])
         case "not":
             return not holds(condition[1], sides, relations, crossed)
+    # a relation by its number and operator
     _, k, operator = condition
     side = sides[k]
     if operator in ("==", "!=") and relations[k].moves:
         return bool((k in crossed) == (operator == "=="))  # equal at the instant of a crossing alone
+    # equality of what jumps: `mode == 2` holds as long as it does
     if operator in ("==", "!="):
         return bool((side == 0.0) == (operator == "=="))
     strict = {">": side > 0.0, "<": side < 0.0, ">=": side >= 0.0, "<=": side <= 0.0}
@@ -48,6 +51,7 @@ class Conditions:
 
     def __init__(self, conditions: Sequence[Condition], relations: Sequence[Relation]) -> None:
         self._conditions, self._relations = conditions, relations
+        # conditions by the relations that they read
         self._of: list[list[int]] = [[] for _ in relations]
         for k, condition in enumerate(conditions):
             for relation in _relations_of(condition):
@@ -57,9 +61,11 @@ class Conditions:
 
     def hold(self, sides: Floats, crossed: Sequence[int] = ()) -> NDArray[np.bool_]:
         """Which hold [conditions] where relations stand on these sides; crossed: as of `holds`."""
+        # asked anew only where a side has changed
         self._ask(np.flatnonzero(sides != self._sides), sides, (), self._held)
         self._sides[:] = sides
         found = self._held.copy()
+        # equalities that hold at this instant alone
         if len(crossed):
             self._ask(crossed, sides, crossed, found)
         return found
@@ -82,6 +88,7 @@ def with_momenta(settled: System, t: float, y: Floats, yd: Floats) -> Floats:
     """
     rows = np.flatnonzero(settled.of_groups("momentum"))
     p = np.flatnonzero(settled.kinds == "p")
+    # momenta are linear in flows but for what moves with them: three passes
     for _ in range(3 if rows.size else 0):
         jy, _ = settled.jacobian(t, y, yd)
         matrix = settled.dense(jy)[np.ix_(rows, p)]

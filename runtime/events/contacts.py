@@ -61,6 +61,7 @@ class Contacts:
         self.time = 0.0
         self.resolution = 0.0  # the tolerance of the steps, of the largest flows
         places = self.switches.places
+        # values of one kind and unit are measured by the largest of them
         kinds = {(c.kind, observer.unit(c.value)) for c in contacts}
         for kind in sorted(kinds):
             same = [c for c in contacts if (c.kind, observer.unit(c.value)) == kind]
@@ -68,9 +69,11 @@ class Contacts:
                 observer.alike([getattr(c, name) for c in same])
             # what friction bears is of the size of its bound, before it has ever held too
             observer.alike([row for c in same for row in (c.multiplier, c.bound) if row >= 0])
+        # a contact has a multiplier where it is a switch, none where a relation holds it
         own = [places[k.number] if k.hold < 0 else None for k in contacts]
         self.multiplier = [-1 if at is None else int(system.form.at[at[0]]) + at[1] for at in own]
         self.frozen = mates(plan, system, self.multiplier)
+        # parameters that say the sense of a friction, and whether a relation holds
         self._sensed, self._sense = _places((k, c.sense) for k, c in enumerate(contacts))
         self._kept, self._hold = _places((k, c.hold) for k, c in enumerate(contacts))
         self._switched, self._number = _places((k, c.number if c.hold < 0 else -1) for k, c in enumerate(contacts))
@@ -83,6 +86,7 @@ class Contacts:
         """
         self.time = time = max(time, SHORTEST)
         kinds, largest = self.system.kinds, self.observer.largest
+        # gaps are displacements, one-way flows are flows
         for contact, place in zip(self.contacts, self.multiplier, strict=True):
             own = kinds == ("q" if contact.kind == "phi" else "f")
             alike = own & (self._units == self.observer.unit(contact.value))
@@ -110,8 +114,10 @@ class Contacts:
         the text names is an effort, and 1/s is rad/s.)
         """
         rows, _, numbers, _ = switch_rows(self.system.description, self.system.form)
+        # the row in which it says that its value is zero
         column, row, flows = self.system.pattern.columns_of(), self.system.pattern.row, self.system.are("f", "s")
         found = {}
+        # units of the flows in that row
         for k in self._one_way:
             own = np.zeros(self.system.rows, dtype=bool)
             own[rows[numbers == self.contacts[k].number]] = True
@@ -125,10 +131,12 @@ class Contacts:
         no more than what is zero of one: located at its edge, a current may be stopped that is none.
         """
         struck = found[2]
+        # one-way flows that hold and have stopped something
         holding = [k for k in self._one_way if self.active[k] and struck[self.multiplier[k]] < 0.0]
         if not holding:
             return struck
         struck, moved = struck.copy(), np.abs(found[0] - y)
+        # what it stopped was no flow
         for k in holding:
             most = moved[: self._flows[k].size][self._flows[k]].max(initial=0.0)
             if most <= EDGE * self.observer.zero(self.contacts[k].value):
@@ -143,9 +151,11 @@ class Contacts:
     def obey(self, values: Floats) -> None:
         """What guards say holds or is not there, whatever stood against them; values: of the observer."""
         self.spared = frozenset()
+        # a guard says whether it holds at all
         for k, contact in enumerate(self.contacts):
             if contact.kind == "guarded":
                 self.active[k] = bool(values[contact.guard])
+            # barred: its guard says that it is not there
             elif self.bar(k, values):
                 self.active[k] = False
 
@@ -157,8 +167,10 @@ class Contacts:
     def apply(self) -> None:
         """The systems of the model follow the active set."""
         now = np.zeros(len(self.switches.places), dtype=bool)
+        # those that mates make superfluous stand for good
         for k, holds in self.frozen.items():
             self.active[k] = holds
+        # what follows a planar friction holds with it
         self.active[self._follow] = self.active[self._follow - 1]
         now[self._number], self.p[self._hold] = self.active[self._switched], self.active[self._kept]
         self.switches.set(now)
@@ -199,8 +211,10 @@ class Contacts:
         """The other state of a contact."""
         contact = self.contacts[k]
         self.active[k] = not self.active[k]
+        # a friction that lets go slips in the sense in which it was loaded
         if contact.kind == "friction":
             self.p[contact.sense] = 0.0 if self.active[k] else np.sign(values[contact.multiplier]) or 1.0
+        # in the plane: along the direction in which it was loaded
         elif contact.kind == "planar":
             self._direct(contact, values[list(contact.aim[2:4])])
             self.p[contact.sense] = 0.0 if self.active[k] else 1.0
@@ -253,16 +267,20 @@ class Contacts:
     def wrongs(self, values: Floats, impulses: Floats) -> Iterator[int]:
         """Contacts whose condition does not hold."""
         plain = self._inequalities
+        # inequalities all at once, others one by one
         asked = np.ones(len(self.contacts), dtype=bool)
         asked[plain.number] = plain.wrong(values, impulses, self)
         asked[self._follow] = False
         asked[list(self.frozen)] = False
+        # a slip without direction keeps the last one
         for k in np.flatnonzero(asked).tolist():
             contact = self.contacts[k]
             test = _TESTS.get(contact.kind, Contacts._unilateral)
+            # against its guard: wrong, but where something would be open without it
             if self.against(k, values):
                 if not (k in self.spared and self.idle(k, values)):
                     yield k
+            # its guard alone decides
             elif contact.kind == "guarded" or self.barred[k]:
                 continue
             elif test(self, k, contact, values, self._impulse_on(k, impulses)):
@@ -301,14 +319,19 @@ class Contacts:
     def _unilateral(self, k: int, c: Contact, values: Floats, impulse: float) -> bool:
         """Whether a contact is wrong as it is: one that holds pulls, or one that is open closes."""
         zero = self.observer.zero
+        # one that holds: it must not pull
         if self.active[k]:
             return bool(impulse < -self.impulse(c) or values[c.multiplier] < -zero(c.multiplier))
+        # open: above zero nothing is wrong
         if values[c.value] > (0.0 if k in self.open else zero(c.value)):
             return False
+        # far below zero: what a step has missed
         if c.kind == "phi" and values[c.value] < -self._beyond(c):
             return True
+        # a one-way flow that is negative, or begins to be
         if c.kind == "psi":
             return bool(values[c.value] < -zero(c.value) or values[c.rate] < -zero(c.rate))
+        # a gap at zero closes by its speed, or at rest by its acceleration
         closing = values[c.rate] < -zero(c.rate)
         return bool(closing or (values[c.rate] <= zero(c.rate) and values[c.acceleration] < -zero(c.acceleration)))
 
@@ -321,6 +344,7 @@ class Contacts:
         that is zero to nothing, by the inertia that the largest multipliers and rates tell.
         """
         flow, change = (c.rate, c.acceleration) if c.kind == "phi" else (c.value, c.rate)
+        # by inertia: what a multiplier of the largest size stops in a unit of time
         zero, largest = self.observer.zero, self.observer.largest
         stops = BODIES * zero(flow) / largest[change] if largest[change] > 0.0 else 0.0
         return max(zero(c.multiplier) * self.time, float(stops * largest[c.multiplier]))
@@ -330,17 +354,21 @@ class Contacts:
         zero, sense = self.observer.zero, float(self.p[c.sense])
         if values[c.bound] == 0.0:  # no friction: it does not hold, whatever holds the bodies (a latch, another law)
             return bool(self.active[k] or sense == 0.0)
+        # sticks: within its bound
         if self.active[k]:
             beyond = abs(values[c.multiplier]) > values[c.bound] + zero(c.multiplier)
             return bool(beyond or self._is_overstrained(k, impulse))
+        # neither sticks nor slips: a sense is to be chosen
         if sense == 0.0:
             return True
+        # slips: not back, nor about to turn back
         slip = sense * values[c.value]
         return bool(slip < -zero(c.value) or (slip <= zero(c.value) and sense * values[c.rate] < -zero(c.rate)))
 
     def finite(self, t: float, y: Floats, yd: Floats) -> frozenset[int]:
         """The frictions whose bound no reaction tells: no impulse is within it."""
         if self._finite is None:
+            # the bound with other reactions: one that does not change is known beforehand
             reactions = self.system.are("kappa", "mu", "e")[: y.size]
             bounds = [self.system.observe(t, np.where(reactions, y + s, y), yd) for s in (-1.0, 0.0, 1.0)]
             frictions = (k for k, c in enumerate(self.contacts) if c.kind in ("friction", "planar"))
@@ -358,10 +386,13 @@ class Contacts:
 
     def _planar(self, k: int, c: Contact, values: Floats, impulse: float) -> bool:
         zero = self.observer.zero
+        # sticks: within its bound, in any direction
         if self.active[k]:
             return bool(values[c.upper] < -zero(c.multiplier) or self._is_overstrained(k, impulse))
+        # slips without direction
         if self.p[c.sense] == 0.0:
             return True
+        # slips: its speed has not turned back
         return bool(values[c.value] < 0.0 or (not self._moves(c, values) and values[c.rate] < -zero(c.rate)))
 
     def passed_impulses(self, t: float, y: Floats, found: tuple[Floats, Floats, Floats]) -> Floats:
@@ -370,14 +401,17 @@ class Contacts:
         """
         form, passed = self.system.form, np.zeros(len(self.contacts))
         moved = (found[0] - y)[form.k_q]
+        # at a start impulses are sought, not known
         if self.starting or not moved.any():
             return passed
+        # flows that the jump of displacements makes, and none
         still = found[0].copy()
         still[form.k_f] = 0.0
         flowing = still.copy()
         flowing[form.k_f] = moved
         rows = [c.value for c in self.contacts]
         both = (self.system.observe(t, point, found[1])[rows] for point in (flowing, still))
+        # what passed a gap is no flow
         return np.asarray(np.where([c.kind == "psi" for c in self.contacts], np.subtract(*both), 0.0))
 
     def backwards(self, t: float, y: Floats, found: tuple[Floats, Floats, Floats]) -> list[int]:
@@ -389,23 +423,28 @@ class Contacts:
     def turn(self, k: int, values: Floats) -> None:
         """What a wrong contact becomes: a friction that slips without a sense takes that of its speed."""
         contact = self.contacts[k]
+        # a planar friction that slips the wrong way takes the direction of its speed
         if contact.kind == "planar" and not self.active[k]:
             if self._moves(contact, values):
                 self._direct(contact, values[list(contact.aim[:2])])
                 self.p[contact.sense] = 1.0
                 return
+            # or widens what is covered, for it goes on
             if self.p[contact.sense] != 0.0 and values[contact.rate] >= -self.observer.zero(contact.rate):
                 self.p[list(contact.direction)] *= WIDER  # it slips on: what steps leave open has turned it
                 return
         slips = contact.kind == "friction" and not self.active[k]
+        # it goes through zero: the other sense
         if slips and k in self.through:
             self.p[contact.sense] = -self.p[contact.sense] or np.sign(values[contact.rate]) or 1.0
             return
+        # moves with the wrong sense: that of its speed, once
         if slips and abs(values[contact.value]) > self.observer.zero(contact.value) and k not in self.reversed:
             if self.p[contact.sense] != 0.0:
                 self.reversed.add(k)
             self.p[contact.sense] = np.sign(values[contact.value])
             return
+        # all others: hold or let go
         self.flip(k, values)
 
 

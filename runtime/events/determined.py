@@ -59,7 +59,7 @@ class Determined:
         return self._system.unknowns <= DENSE and self.nullity(t, y, yd) > 0
 
     def leaves(self, t: float, y: Floats, yd: Floats) -> int:
-        """The same, 0 of models too large to ask."""
+        """How many directions the equations leave open at a point; 0 of models too large to ask."""
         return self.nullity(t, y, yd) if self._system.unknowns <= DENSE else 0
 
     def nullity(self, t: float, y: Floats, yd: Floats) -> int:
@@ -71,30 +71,37 @@ class Determined:
         contacts that have to do with it.
         """
         number, part, _ = self._open(t, y, yd) if self._system.unknowns <= DENSE else (0, np.zeros(0), None)
+        # nothing open, or too large to ask
         if not number:
             return np.zeros((0, 0)), []
         n = self._system.form.written
+        # null vectors of the pencil at a short step
         scaled, column = _pencil(self._system, *self._system.jacobian(t, y[:n], yd[:n]))
         right = singular_decomposition(scaled)[2]
         return (right[len(right) - number :] * column)[:, :n], np.flatnonzero(part > NOTHING).tolist()
 
     def _open(self, t: float, y: Floats, yd: Floats) -> tuple[int, Floats, NDArray[np.bool_]]:
-        """The same; how much the row of each contact has to do with it [contacts]: what has nothing closes nothing; the
-        unknowns [unknowns as written] that are determined all the same.
+        """How many directions are open; how much the row of each contact has to do with it [contacts]: what has nothing
+        closes nothing; the unknowns [unknowns as written] that are determined all the same.
         """
         key = tuple(self.contacts.active.tolist())
+        # once for each active set
         if key not in self._regular:
             system, n = self._system, self._system.form.written
             jy, jyd = system.jacobian(t, y[:n], yd[:n])
+            # no slopes: taken as determined
             if not (np.isfinite(jy).all() and np.isfinite(jyd).all()):
                 return 0, np.zeros(len(key)), np.ones(n, dtype=bool)
             scaled, _ = _pencil(system, jy, jyd)
+            # regular beyond doubt: no singular values needed
             if sure_solver(scaled, CERTAIN) is not None:
                 self._regular[key] = 0, np.zeros(len(key)), np.ones(n, dtype=bool)
                 return self._regular[key]
             left, sigma, right = singular_decomposition(scaled)
+            # rank; what null vectors hardly move is determined
             some = count(sigma, CERTAIN)
             part, told = np.zeros(len(key)), np.linalg.norm(right[some:, :n], axis=0) <= NOTHING
+            # rows of contacts in the left null space
             if some < sigma.size:
                 rows, _, number, _ = switch_rows(system.description, system.form)
                 share = np.linalg.norm(left[rows, some:], axis=1)
@@ -111,9 +118,11 @@ class Determined:
         last.
         """
         found = self.pivoting.fit(t, y, yd, settle)
+        # large models are taken as they are
         if self._system.unknowns > DENSE:
             return found
         open_ = self.nullity(t, *found)
+        # while a neighbouring set leaves less open
         while open_ > 0:
             better = next(self._better(t, found, settle, (open_, turned)), None)
             if better is None:
@@ -132,17 +141,22 @@ class Determined:
         shares = np.argsort(-np.round(part, ALIKE), kind="stable").tolist()
         order = self._lowest_first(t, point, [k for k in shares if part[k] > NOTHING])
         zero = {k: abs(values[(row := contacts.contacts[k].value)]) <= contacts.observer.zero(row) for k in order}
+        # frictions at rest first, then with pivots, then those that carry something
         for pivots, small in ((False, True), (True, True), (False, False)):
             for k in sorted(order, key=lambda k: k in turned):
+                # wrong size for this pass, or frozen
                 if zero[k] != small or k in contacts.frozen:
                     continue
+                # gaps and frictions that move are not turned without need
                 if not (small or contacts.contacts[k].kind in ("psi", "guarded")):
                     continue
                 for turn in self._turns(k, values):
                     turn()
                     contacts.apply()
+                    # spared: it may stand against its guard
                     contacts.spared = spared | {k}
                     found = self._near(t, point, settle, pivots=pivots)
+                    # the same motion, and less open
                     if found is not None and self._goes_on(k, (point, found), told, small=small):
                         less = self.nullity(t, *found)
                         if less < open_:
@@ -155,9 +169,11 @@ class Determined:
         anyhow, not one behind a coil, whose current then is a constraint of a constraint.
         """
         contacts, before = self.contacts, self.contacts.state()
+        # a single one, or a large model: as they are
         if len(order) < 2 or self._system.unknowns > SMALL:
             return order
         indices = dict[int, int]()
+        # the index with each of them turned
         for k in order:
             contacts.active[k] ^= True
             contacts.apply()
@@ -171,6 +187,7 @@ class Determined:
         if key not in self._indices:
             n = self._system.form.written
             jy, jyd = (self._system.dense(part) for part in self._system.jacobian(t, y[:n], yd[:n]))
+            # without slopes: behind all others
             finite = np.isfinite(jy).all() and np.isfinite(jyd).all()
             self._indices[key] = _index_of(*equilibrate(jyd, jy)) if finite else FAR
         return self._indices[key]
@@ -182,9 +199,11 @@ class Determined:
         """
         (y, yd), (other, other_d) = points
         flows = self._moves & told
+        # at rest: nothing that moves may change
         if small:
             moves = _same(yd, other_d, self._moves & self._rated_unknowns, NOTHING) and _same(y, other, flows, NOTHING)
             return moves or self.contacts.contacts[k].hold < 0
+        # under way: flows and their rates within what counts
         least = self.contacts.observer.zero(self.contacts.contacts[k].value) / SAME  # what is less is no flow
         time = self.contacts.time
         size = np.abs(y[: flows.size][flows]).max(initial=least) / time if time > 0.0 else 0.0
@@ -207,8 +226,10 @@ class Determined:
         is loaded, while others hold its bodies.
         """
         contacts, contact = self.contacts, self.contacts.contacts[k]
+        # inequalities and guards: the other state
         if contact.kind in ("psi", "phi", "guarded"):
             yield lambda: contacts.flip(k, values)
+        # a friction that sticks: at its bound, either way
         elif contact.kind == "friction" and contacts.active[k]:
             loaded = np.copysign(1.0, values[contact.multiplier])
             yield lambda: contacts.slip(k, loaded)
@@ -216,11 +237,13 @@ class Determined:
 
     def _near(self, t: float, point: Point, settle: Settle, *, pivots: bool) -> Point | None:
         """The point of the present active set where that fits, or with pivots of one that fits; None without."""
+        # any set that fits from there
         if pivots:
             try:
                 return self.pivoting.fit(t, *point, settle)
             except NoActiveSetError:
                 return None
+        # this very set
         found = settle(t, *point)
         if found is None or not self.contacts.fits(t, point[0], found):
             return None
@@ -229,10 +252,12 @@ class Determined:
 
 def _index_of(e: Floats, b: Floats) -> int:
     """Of e y' + b y = r, less 1: the power with which the least singular value falls beyond the fastest rate."""
+    # rows with rates by the fastest of these
     rated, own = np.abs(e).max(axis=1, initial=0.0), np.abs(b).max(axis=1, initial=0.0)
     rates = rated > 0.0
     size = np.where(rates, rated, 1.0)
     fast = float((own / size)[rates].max(initial=0.0)) or 1.0
+    # at two ever faster rates: index k falls with the power k - 1
     ways = (e / size[:, None] + b / np.where(rates, size * fast * close, 1.0)[:, None] for close in CLOSE)
     near, far = (float(singular_decomposition(m)[1].min(initial=1.0)) for m in ways)
     return round(float(np.log(near / far) / np.log(CLOSE[1] / CLOSE[0]))) if min(near, far) > 0.0 else FAR

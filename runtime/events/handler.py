@@ -103,6 +103,7 @@ class Handler(Watching):
         """These stand again."""
         self.p[:] = standing[0]
         self.contacts.take(standing[1])
+        # the settler's factors belong to other rows
         if self.restart is not None:
             self.restart.settler.core.contents.ready = 0
 
@@ -121,10 +122,12 @@ class Handler(Watching):
         has it; p has the values then.  None where they assign what p does not hold.
         """
         values = self.observer(t, y, yd)
+        # sides by values, conditions by sides, then samples and what follows
         self._take_sides(t, values, np.ones_like(self.side), self.observer.zeros(self._row))
         self.truth, self.rounds = self._conditions.hold(self.side), []
         self._cascade(t, y, yd, range(len(self.plan.sampled)), [])
         assigned = [a for r in self.rounds for group in r.groups for a in group]
+        # only parameters may be assigned before there is a start
         return [a.place for a in assigned] if all(a.kind == "discrete" for a in assigned) else None
 
     def begin(self, t: float, y: Floats, yd: Floats, *, sampled: bool = False) -> Point | None:
@@ -134,6 +137,7 @@ class Handler(Watching):
         values = self.observer(t, y, yd)
         self._take_sides(t, values, np.ones_like(self.side), self.observer.zeros(self._row))
         self._verify_bounds(t, values)
+        # a friction that would drive from the start on
         drives = self.succession.driving_friction(t, y, yd, values) if self.restart is not None else None
         if drives is not None:
             raise SolverFailure("drives", t, 0.0, drives)
@@ -141,8 +145,10 @@ class Handler(Watching):
         self.choices.begin(t, y, yd)
         self.truth = self._conditions.hold(self.side)
         due, anew = self.due(t), self.kinks.begin(values)
+        # samples at the start, unless it is already behind them
         if due and not sampled:
             return self.fire(t, y, yd, due)
+        # laws that jump, and stand at their jump
         return self.settle(t, y, yd, self.contacts.standing()) if anew else None
 
     def _take_sides(self, t: float, values: Floats, before: Floats, zeros: Floats) -> None:
@@ -152,6 +158,7 @@ class Handler(Watching):
         values = values[self._row]
         if np.isnan(values).any():
             raise SolverFailure("nonfinite", t, 0.0)
+        # what crossed exactly, or jumps at its crossing, is not near
         exact = values != 0.0
         exact[self._exact] = True
         near = exact & (np.abs(values) <= np.where(self._moves, zeros, 0.0))
@@ -168,7 +175,9 @@ class Handler(Watching):
         """Turns sides and branches of laws; what then counts of what is watched, the relations that have crossed."""
         crossed = [w.relation for w in which if w.relation >= 0]
         values = self.observer(t, y, yd) if self.plan.relations else np.zeros(0)
+        # values exactly zero at the crossing
         self._exact = [k for k in crossed if values[self.plan.relations[k].row] == 0.0]
+        # values that jumped past it by more than counts
         self._jumps = {
             w.relation: float(w.side)
             for w in which
@@ -176,6 +185,7 @@ class Handler(Watching):
         }
         self._hold(values, crossed)
         which = self.turns.verify_passage(t, which)
+        # relations change sides, laws change branches
         for w in which:
             if w.relation >= 0:
                 self.side[w.relation] = -float(w.side)
@@ -188,14 +198,17 @@ class Handler(Watching):
         assigned: list[tuple[str, tuple[Assignment, ...]]] = [
             (self.plan.sampled[k].name, self.plan.sampled[k].assignments) for k in samples
         ]
+        # each round may make other conditions true
         for _ in range(CASCADE):
             fired = self._risen(crossed)
             assigned += [(self.plan.whens[k].name, self.plan.whens[k].assignments) for k in fired]
+            # nothing more becomes true
             if not assigned:
                 return y
             y = self._assign(t, y, yd, assigned)
             self.rounds.append(Round(tuple(group for _, group in assigned), self.side.copy()))
             assigned, crossed = [], []
+        # conditions that make each other true without end
         raise SolverFailure("chatter", t, 0.0, self._names())
 
     def fire(
@@ -206,13 +219,17 @@ class Handler(Watching):
         rounds, simple: what is assigned, and whether that is all, and without an impact; struck: the gap that closed in
         flight and opened again, where that is all, else -1; soon (s): sooner than that the same shall be asked again.
         """
+        # too many events at one instant are refused
         self._count(t)
         self.choices.end(t, y, yd)
         free, lone = self._free("friction"), self._free("friction", "phi")
         self.simple, self.struck, self.rounds, self.soon = True, -1, [], 0.0
+        # as all stood before
         said, stood, flew = self.contacts.standing(), self.kinks.state(), self.bounces
+        # values that an assignment has told are known anew
         self._assigned[:] = self.observer.exact[self._row] == ASSIGNED
         self.observer.exact[self.observer.exact == ASSIGNED] = 0
+        # what crosses turns first, then assignments follow
         self.kinks.begin_instant()
         which, crossed = self._turn_sides(t, y, yd, which)
         begun, y, yd = y, y.copy(), yd.copy()
@@ -221,10 +238,13 @@ class Handler(Watching):
         touched = list(dict.fromkeys(w.contact for w in which if w.contact >= 0))
         bent = any(w.kink >= 0 for w in which)
         self._sink(t, which)
+        # a flow that is assigned blows against contacts
         self.succession.blow = any(a.kind == "flow" for r in self.rounds for group in r.groups for a in group)
+        # the core repeats what is assigned, not contacts that turn
         self.simple &= not (self.succession.blow and not (free and self._plain))
         self.simple &= not (self.rounds and (touched or bent))
         self.simple &= all(self.plan.contacts[k].kind != "phi" for k in touched)
+        # nothing to do: no sample, no law, no assignment, no contact
         if not (samples or bent or self.rounds or touched):
             return None
         # the point behind it all
@@ -232,10 +252,12 @@ class Handler(Watching):
         point = self._follow_conditions(t, self.settle(t, y, yd, said, touched))
         self._due_at_once(t, point, crossed)
         self.turns.seen(t, point)
+        # relations that an assignment sends back at once
         self._return(t, begun, point, which)
         thrown = new(self.bounces, flew)
         self.struck = self.struck if self._has_bounced(self.struck, thrown) else -1
         self.simple &= not thrown
+        # what laws became, and how long peaks take
         self.happened += self.kinks.changes(t, stood)
         self.passes = self.kinks.passing(stood, self.observer(t, *point)) if self.kinks.peaks else np.inf
         return point
@@ -245,24 +267,29 @@ class Handler(Watching):
         from this point on have their side again (tanks that are filled by turns); these, and what assignments have put
         next to zero, are known to rounding until they have crossed.
         """
+        # without relations none comes back
         if not self.plan.relations:
             return
         row, (y, yd) = self._row, point
         here, zeros = self.observer(t, y, yd)[row], self.observer.zeros(row)
         near, rounding = np.abs(here) <= zeros, self.observer.rounding(row, here)
         back = near & (self.side * here < -rounding)
+        # still moving past zero a little later
         back[crossed] = False
         if back.any():
             step = PART * self.contacts.time
             back &= self.side * (self.observer(t + step, y + step * yd, yd)[row] - here) > zeros
+        # these have turned: conditions anew
         if back.any():
             self.side[back] *= -1.0
             self.truth, self.simple = self._conditions.hold(self.side), False
+        # known to rounding: within it a crossing is none
         near &= (self._assigned | back) & self._moves & (self.side * here > rounding)
         self.observer.exact[row[near]] = ASSIGNED
 
     def _hold(self, values: Floats, crossed: Sequence[int]) -> None:
         """What a constraint holds at zero since an event before (a speed that sticks) is on neither side."""
+        # at an instant that has stalled no time has passed to stick in
         if self.stalled:
             return
         still = self._moves & (np.abs(values[self._row]) <= HELD * self.observer.zeros(self._row))
@@ -273,12 +300,15 @@ class Handler(Watching):
         """SolverFailure where what was assigned sends a relation back for so little that it is not seen to return;
         begun: y before.  What others have stopped (a one-way clutch) is not sent.
         """
+        # states that were assigned and moved
         moved = [a.place for r in self.rounds for group in r.groups for a in group if a.kind != "discrete"]
         sent = any(abs(point[0][k]) > STOPPED * abs(begun[k]) for k in moved)
         falls = [(w.row, w.side) for w in which if w.relation >= 0 and self.side[w.relation] == -w.side]
+        # nothing was sent, or nothing has crossed
         if not (sent and falls and self.restart is not None):
             return
         for flight, least in flights(self.observer, self.restart, t, point, self.contacts.time, falls):
+            # back sooner than can be seen: without end
             if flight.flight <= least:
                 raise SolverFailure("zeno", t, 0.0, self._names())
             self.soon = max(self.soon, LEAST * least)
@@ -298,20 +328,25 @@ class Handler(Watching):
         """The point after the conditions that became true where the constraints were found anew."""
         for _ in range(CASCADE):
             fired = self._risen(())
+            # no condition became true
             if not fired:
                 return point
             self.simple, self.struck, said = False, -1, self.contacts.standing()
+            # assignments, and the constraints behind them
             y = self._assign(t, *point, [(self.plan.whens[k].name, self.plan.whens[k].assignments) for k in fired])
             point = self.settle(t, y, point[1], said)
+        # conditions and constraints that do not come to an end
         raise SolverFailure("chatter", t, 0.0, self._names())
 
     def settle(self, t: float, y: Floats, yd: Floats, said: Stood, touched: Sequence[int] = ()) -> Point:
         """The consistent point with the constraints and the branches that hold from now on."""
         self.kinks.leave(self.observer(t, y, yd))
         point = self._settle_constraints(t, y, yd, said, touched)
+        # each turn of a branch may turn another
         try:
             while self.kinks.turn(self.observer(t, *point)):
                 point = self._settle_constraints(t, *point, self.contacts.standing())
+        # a law that is driven to both sides, or branches in a circle
         except NoBranchError as error:
             raise SolverFailure("slides" if error.pushed else "chatter", t, 0.0, ", ".join(error.names)) from error
         return point
@@ -329,6 +364,7 @@ class Handler(Watching):
     def _settle_constraints(self, t: float, y: Floats, yd: Floats, said: Stood, touched: Sequence[int] = ()) -> Point:
         """The consistent point with the constraints that hold from now on; SolverFailure where there is none."""
         assert self.restart is not None
+        # without contacts: a point across the event
         if not self.plan.contacts:
             found = self.restart.across(t, y, yd)
             if found is None:
@@ -338,12 +374,14 @@ class Handler(Watching):
         self.restart.bounded(t, y, yd)
         try:
             found, anew = self.succession.after(t, y, yd, touched, stalled=self.stalled > 0)
+        # no set fits: whether a friction drives is a clearer word
         except NoActiveSetError as error:
             drives = self.succession.driving(t, y, yd)
             cause = "complementarity" if drives is None else "drives"
             raise SolverFailure(cause, t, 0.0, drives or ", ".join(error.names)) from error
         self._renew(t, *found)
         self.choices.begin(t, *found)
+        # gaps are thrown only where the set was sought
         if anew:
             self._bounce(t, *found, {*touched, *self.succession.impacts.closed})
         self._note(t, said, {*touched, *self.succession.impacts.closed})
@@ -352,10 +390,12 @@ class Handler(Watching):
     def _bounce(self, t: float, y: Floats, yd: Floats, met: Set[int]) -> None:
         """The gaps in flight: that were, and have not been met, or that open here."""
         values, contacts = self.observer(t, y, yd), self.plan.contacts
+        # open gaps that stand at zero begin a flight
         free = ~self.contacts.active[self._gap]
         here = values[self._gaps] <= self.observer.zeros(self._gaps)
         still = {contacts[k].value for k in set(self._gap[free].tolist()) - met}
         begin = begun_flights(t, values, [contacts[k] for k in self._gap[free & here]])
+        # flights that were go on where nothing was met
         self.bounces = begin | {row: bounce for row, bounce in self.bounces.items() if row in still}
 
     def _note(self, t: float, said: Stood, struck: Set[int]) -> None:
@@ -363,8 +403,10 @@ class Handler(Watching):
         words = self.contacts.changed_contacts(said)
         for k in sorted({*words, *struck}):
             contact = self.plan.contacts[k]
+            # what stands otherwise than before
             if k in words and contact.kind != "follows":
                 self.happened.append(Happened(t, contact.name, contact.name, *words[k]))
+            # an impact behind which all is as before
             elif contact.kind == "phi":
                 word = self.contacts.word(k)
                 self.happened.append(Happened(t, f"impact {contact.name}", contact.name, word, word))
@@ -384,18 +426,22 @@ class Handler(Watching):
         for k, (name, assignments) in enumerate(events):
             said, now = [], []
             for a in assignments:
+                # two events set one value at one instant
                 other = set_by.setdefault((a.kind, a.place), k)
                 if other != k:  # elements of one family have a name in common
                     raise SolverFailure("conflict", t, 0.0, f"{a.name} (by '{events[other][0]}' and by '{name}')")
+                # a value that is no number
                 if not np.isfinite(values[a.row]):
                     raise SolverFailure("overflows", t, 0.0, f"{a.name} (= {values[a.row]:g}, by '{name}')")
                 target = self.p if a.kind == "discrete" else y
                 said.append(f"{a.name} = {target[a.place]:.9g}")
                 target[a.place] = values[a.row]
                 now.append(f"{a.name} = {values[a.row]:.9g}")
+            # the element that owns what is assigned
             element = assignments[0].name.rpartition(".")[0] if assignments else ""
             self.happened.append(Happened(t, name, element, ", ".join(said), ", ".join(now)))
         self.kinks.begin_instant()
+        # flows: momenta follow
         if any(a.kind == "flow" for _, assignments in events for a in assignments):
             settled = self.restart.instant.system if self.restart else self.system
             y = with_momenta(settled, t, y, yd)
@@ -407,6 +453,7 @@ class Handler(Watching):
         end) the second time.
         """
         sinking = {w.contact for w in which if w.contact >= 0 and w.row == self.plan.contacts[w.contact].bound}
+        # the second time, and by the bound alone
         if sinking & self._sinking and all(w.contact in sinking for w in which):
             raise SolverFailure("drives", t, 0.0, self.plan.contacts[min(sinking)].name)
         self._sinking = sinking
@@ -421,6 +468,7 @@ class Handler(Watching):
         values = self.observer(t, y, yd)
         self._verify_bounds(t, values)
         here, zeros = values[self._row], self.observer.zeros(self._row)
+        # what an assignment moved is known to round-off
         if was is not None:
             rounding = self.observer.rounding(self._row, here)
             assigned = np.abs(here - was[self._row]) > rounding
@@ -434,18 +482,23 @@ class Handler(Watching):
     def _count(self, t: float) -> None:
         near = t - self.last <= self.nothing
         self.stalled, self.last = (self.stalled + 1 if near else 0), t
+        # instants that shrink towards a limit
         if self.stalled and self._accumulate(t):
             raise SolverFailure("zeno", t, 0.0, self._names())
+        # too many without time passing: laws alone, or all
         if self.stalled > STALLED:
             raise SolverFailure("fold" if self._turns_alone() else "chatter", t, 0.0, self._names())
+        # the user's limit
         if self.plan.limit is not None and len(self.happened) > self.plan.limit:
             raise SolverFailure("max_events", t, 0.0, self._names())
 
     def _accumulate(self, t: float) -> bool:
         """Whether the instants of what happened have a limit that is not told from t."""
+        # the last instants, by their gaps
         gaps = np.diff(sorted({h.time for h in self.happened[-RECENT:]})[-SHRINKING - 2 :])
         if gaps.size <= SHRINKING or gaps[-1] > NO_TIME * np.spacing(abs(t)):
             return False
+        # each a fixed part of the one before
         ratios = gaps[1:] / gaps[:-1]
         return bool((ratios < 1.0).all() and (ratios > BY_CHANCE).all())
 

@@ -87,25 +87,32 @@ class Impacts:
         """
         contacts, zero = self.contacts, self.contacts.observer.zero
         values, terms = contacts.observer(t, y, yd), contacts.observer.terms.copy()
+        # contacts whose gaps are closed
         near = [k for k in range(len(contacts.contacts)) if k not in contacts.frozen and self._near(k, values)]
         speed = {k: float(values[self._flow(k)]) for k in near if contacts.contacts[k].kind == "phi"}
+        # of these, the gaps that close
         closing = self.closed = [k for k in speed if speed[k] < -zero(self._flow(k))]
+        # neither impact nor blow
         if not (closing or (blow and near)):
             return y
         aim = dict.fromkeys(near, 0.0)
+        # Newton's law: the speed behind is -e times that before
         for k in closing:
             c, back = contacts.contacts[k], -contacts.contacts[k].restitution * speed[k]
             self.fastest[k] = max(self.fastest[k], -speed[k])
             # what rises less than round-off of its gap cannot be told from rest
             risen = back * back > -2.0 * values[c.acceleration] * UNSEEN * terms[c.value]
             aim[k] = back if risen and back > max(self.rest * self.fastest[k], zero(c.rate)) else 0.0
+        # frictions of a finite bound bear no impulse
         for k in contacts.finite(t, y, yd):
             if contacts.active[k]:
                 contacts.slip(k, 0.0)
         found = self._among_frictions(_Blow((t, y, yd), strike, system, aim))
+        # energy out of nothing: once more without bouncing
         if self._feeds(found, values):
             aim = dict.fromkeys(near, 0.0)
             found = self._among_frictions(_Blow((t, y, yd), strike, system, aim))
+        # those that stay closed hold
         for k in near:
             contacts.active[k] = aim[k] == 0.0 and found.values[self._flow(k)] <= zero(self._flow(k))
         contacts.apply()
@@ -135,24 +142,30 @@ class Impacts:
         would turn back, and slides where holding needs more than its bound.
         """
         contacts = self.contacts
+        # frictions whose bound is told by reactions take part in the impulse
         told = [k for k, c in enumerate(contacts.contacts) if c.kind == "friction"]
         told = [k for k in told if k not in contacts.finite(*blow.point)]
         for _ in range(TRIALS * (1 + len(told))):
             found = self._struck(blow)
+            # one after the other until all fit Coulomb's law
             k = next((k for k in told if self._gives_wrong(k, found, blow)), None)
             if k is None:
                 return found
             held = contacts.active[k]
+            # from sticking to a slip, or back
             contacts.slip(k, float(np.sign(self._impulse(k, found, blow)[0])) if held else 0.0)
             contacts.active[k] = not held
+        # frictions that turn without end
         raise NoActiveSetError(tuple(contacts.contacts[k].name for k in told))
 
     def _gives_wrong(self, k: int, found: _Struck, blow: _Blow) -> bool:
         """Whether a friction that holds has more than its bound, or one that slides has turned back."""
         contacts, contact = self.contacts, self.contacts.contacts[k]
+        # slides: not backwards
         if not contacts.active[k]:
             slip = float(contacts.p[contact.sense]) * found.values[contact.value]
             return bool(slip < -contacts.observer.zero(contact.value))
+        # sticks: within its bound
         impulse, bound = self._impulse(k, found, blow)
         return bool(abs(impulse) > bound + contacts.impulse(contact))
 
@@ -168,6 +181,7 @@ class Impacts:
         aim, of = blow.aim, partial(self._effect_of, blow)
         now, seen = of([]), set[frozenset[int]]()
         had = now.impulses
+        # complementarity over impulses, by turning one at a time
         for _ in range(TRIALS * (1 + len(aim))):
             if now.pulls:  # as far on the way as none does: what comes to nothing there is let go
                 part = {k: had[k] / (had[k] - now.impulses[k]) for k in now.pulls}
@@ -175,30 +189,37 @@ class Impacts:
                 had = had + part[first] * (now.impulses - had)
                 now = of([k for k in now.struck if k != first])
                 continue
+            # none pulls: impulses so far are the best known
             had = np.maximum(now.impulses, 0.0)
             worst = max(now.off, key=now.off.__getitem__)
+            # all part as they should
             if now.off[worst] <= 1.0:
                 return now
             before, now = now, of([*now.struck, worst])
             if now.contradicts:  # what is said by others already takes the place of one of them
                 instead = {j: of([*(k for k in before.struck if k != j), worst]) for j in before.struck}
+                # those that cannot strike together with the worst
                 jammed = [worst, *(j for j, one in instead.items() if not one.contradicts)]
                 now = next((one for one in instead.values() if one.fits and frozenset(one.struck) not in seen), now)
                 seen.add(frozenset(now.struck))
                 if now.contradicts and any(aim[k] > 0.0 for k in jammed):  # a closed chain: nothing can part there
                     return self._struck(blow._replace(aim=aim | dict.fromkeys(jammed, 0.0)))
+        # no set of impulses fits
         raise NoActiveSetError(tuple(self.contacts.contacts[k].name for k in aim))
 
     def _effect_of(self, blow: _Blow, struck: list[int]) -> _Struck:
         """What impulses of these alone make."""
         contacts, zero = self.contacts, self.contacts.observer.zero
         point, aim = blow.point, blow.aim
+        # these strike, the others not
         for k in aim:
             contacts.active[k] = k in struck
         contacts.apply()
         y, impulses = blow.strike(*point, self._aims(blow, struck))
         values, now = contacts.observer(point[0], y, point[2]), impulses[contacts.multiplier]
+        # how far each is from the speed it should have
         off = {k: (aim[k] - values[self._flow(k)]) / zero(self._flow(k)) for k in aim}
+        # strikes that would have to pull
         pulls = [k for k in struck if now[k] < -contacts.impulse(contacts.contacts[k])]
         own = np.where(np.isin(np.arange(now.size), struck), now, 0.0)
         return _Struck(struck, y, values, own, impulses, off, pulls)
@@ -208,6 +229,7 @@ class Impacts:
         system, aim = blow.system, blow.aim
         aims = np.zeros(system.rows)
         first = {(group, family): row for group, family, row in system.form.groups}
+        # of gaps that bounce alone
         for k in (k for k in struck if aim[k] > 0.0):
             family, position = self.contacts.switches.places[self.contacts.contacts[k].number]
             row = first["phi_rate", multiplier_row(system.description, family)] + position

@@ -56,34 +56,43 @@ class Implicit:
         None where there is none.
         """
         contacts, free = self.contacts, self._free()
+        # dense matrices only
         if self.system.unknowns > DENSE:
             return None
         own = [contacts.contacts[k] for k in free]
+        # rows of the inequalities, and places of their multipliers
         row, at = np.array([self._places[c.number] for c in own], dtype=int).reshape(-1, 2).T
         value = [c.value for c in own]
         matrix, residual, now = self._linear(t, y, h, free)
+        # beyond the domain of a law
         if not (np.isfinite(matrix).all() and np.isfinite(residual).all()):
             return None
+        # signed so that a value that falls is negative
         slope = self._sign(t, y, matrix[row], value)[:, None] * matrix[row]
         unit = np.zeros_like(slope)
         unit[np.arange(len(free)), at] = 1.0
+        # unknowns by the right sides of inequalities, and by what all rows miss
         right = np.zeros((len(matrix), len(free) + 1))
         right[:, -1], right[row, np.arange(len(free))] = -residual, 1.0
         pairs = (slope, unit), (now[value], y[at])
+        # which of each pair is zero to begin with
         found = base_of(matrix, right, row, pairs, contacts.active[free])
         if found is None:
             return None
         moves, held = found
         told, end = (np.where(held[:, None] if one.ndim > 1 else held, other, one) for one, other in pairs)
+        # pairs in units of their sizes
         largest = contacts.observer.largest
         pair = largest[value], largest[[c.multiplier for c in own]]
         size, grows = (np.where(held, *sizes) for sizes in (pair[::-1], pair))
         answer = told @ moves
+        # w = q + M z: complementary pairs
         begin, slopes = end + answer[:, -1], answer[:, :-1] * grows / size[:, None]
         turned = lemke(slopes, begin / size)
         if turned is None:  # of values that are round-off one may seem to be less than zero
             terms = np.abs(end) + np.abs(told) @ np.abs(moves[:, -1])
             turned = lemke(slopes, np.where(np.abs(begin) <= ROUND_OFF * terms, 0.0, begin) / size)
+        # no solution
         if turned is None:
             return None
         active = contacts.active.copy()
@@ -92,6 +101,7 @@ class Implicit:
 
     def _linear(self, t: float, y: Floats, h: float, free: list[int]) -> tuple[Floats, Floats, Floats]:
         """Slopes of the rows of a step, in which all inequalities hold, and their residual; values [observed]."""
+        # all inequalities hold: their rows read their values
         contacts, zeros = self.contacts, np.zeros_like(y)
         stood = contacts.state()
         contacts.active[free] = True
@@ -123,12 +133,15 @@ def base_of(
     """
     (slope, unit), (value, multiplier) = pairs
     held, turned = held.copy(), np.zeros(held.size, dtype=bool)
+    # turn what the singular rows point at until they are regular
     while True:
         matrix[row], right[row, -1] = np.where(held[:, None], slope, unit), -np.where(held, value, multiplier)
         found, open_ = _solve_graded(matrix, right)
+        # regular
         if found is not None:
             return found, held
         part = np.where(turned, 0.0, open_[row])
+        # singular whatever the inequalities are
         if not part.max(initial=0.0) > SHARE:
             return None
         k = int(np.argmax(part))
@@ -140,7 +153,9 @@ def _solve_graded(matrix: Floats, right: Floats) -> tuple[Floats | None, Floats]
     much each row [rows] has to do with that.
     """
     row, column = (factor[:, None] for factor in factors(matrix))
+    # equilibrated
     even = row * matrix * column.T
+    # singular: its left null vector says by which rows
     left, sigma, _ = singular_decomposition(even)
     if not sigma[-1:].min(initial=1.0) > REGULAR:
         return None, np.abs(left[:, -1])
@@ -154,24 +169,31 @@ def lemke(m: Floats, q: Floats) -> Floats | None:
     Lemke 1965; Cottle, Pang and Stone 1992, section 4.4.
     """
     n = q.size
+    # zero is the solution
     if not (q < 0.0).any():
         return np.zeros(n)
     table = np.hstack([np.eye(n), -m, -np.ones((n, 1)), q[:, None]])  # of w, z, the covering z0, and what they come to
+    # the covering variable enters for the most negative
     basis, leaves, enters = np.arange(n), int(np.argmin(q)), 2 * n
     for _ in range(PIVOTS * (n + 1)):
+        # one step of elimination
         table[leaves] /= table[leaves, enters]
         others = np.arange(n) != leaves
         table[others] -= np.outer(table[others, enters], table[leaves])
         out, basis[leaves] = int(basis[leaves]), enters
+        # the covering variable has left: done
         if out == 2 * n:
             found = np.zeros(2 * n + 1)
             found[basis] = np.maximum(table[:, -1], 0.0)
             return found[n : 2 * n]
+        # the partner of what left enters (complementary pivoting)
         enters = (out + n) % (2 * n)
         column = table[:, enters]
         grows = column > PIVOT * np.abs(column).max()
+        # a ray: no solution
         if not grows.any():
             return None
+        # the least ratio; among equals the covering variable, then the largest pivot
         ratio = np.where(grows, np.maximum(table[:, -1], 0.0) / np.where(grows, column, 1.0), np.inf)
         least = np.flatnonzero(ratio <= ratio.min() * (1.0 + ALIKE))
         covering = least[basis[least] == 2 * n]

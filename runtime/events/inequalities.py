@@ -24,6 +24,7 @@ class Inequalities:
     """Those of gaps and flows that no guard takes away, asked all at once as `Contacts._unilateral` asks one."""
 
     def __init__(self, contacts: Sequence[Contact], multiplier: Sequence[int], frozen: Container[int]) -> None:
+        # gaps and one-way flows without guard, that are not frozen
         found = [
             (k, c.kind == "phi", c.value, c.rate, c.acceleration, c.multiplier, multiplier[k])
             for k, c in enumerate(contacts)

@@ -54,13 +54,16 @@ class Kinks:
     def rows(self, k: int) -> Sequence[tuple[int, int]]:
         """Rows of kink k, and the sides of zero whose other one ends a piece."""
         kink, branch = self.kinks[k], self.p[self.kinks[k].branch]
+        # sliding: until either side pulls away
         if branch == SLIDES:
             return ((kink.above, 1), (kink.below, 1))
+        # on a branch: its own side; live: both
         return ((kink.value, int(branch)),) if branch in (ABOVE, BELOW) else ((kink.value, 1), (kink.value, -1))
 
     def cross(self, k: int, row: int, side: int) -> None:
         """What kink k becomes where the row has changed its side."""
         kink = self.kinks[k]
+        # off its sliding surface, or across zero
         sliding = self.p[kink.branch] == SLIDES
         branch = (ABOVE if row == kink.above else BELOW) if sliding else float(-side)
         self.p[kink.branch] = branch
@@ -74,6 +77,7 @@ class Kinks:
     def begin(self, values: Floats) -> bool:
         """Branches by the values of a start at which all are live; whether a law jumps, so that all is found anew."""
         for kink in self.kinks:
+            # at its surface: a law that jumps begins above, others are live
             on = abs(values[kink.value]) <= self.observer.zero(kink.value)
             self.p[kink.branch] = (ABOVE if kink.jumps else LIVE) if on else np.sign(values[kink.value])
         self.begin_instant()
@@ -81,6 +85,7 @@ class Kinks:
 
     def leave(self, values: Floats) -> None:
         """What slides is let go where a jump (of the text, of what an event assigned) has left its surface."""
+        # pushed off its surface
         for kink in self.kinks:
             if self.p[kink.branch] == SLIDES and abs(values[kink.value]) > self.observer.zero(kink.value):
                 self.p[kink.branch] = float(np.sign(values[kink.value]))
@@ -91,11 +96,14 @@ class Kinks:
             better = self._better(k, kink, values)
             if better is None:
                 continue
+            # rests: not tried again at this instant
             if better == RESTS:
                 self._tried.add(k)
+            # from one side to the other: counted
             elif self.p[kink.branch] != RESTS:
                 seen = self._turned.setdefault(k, [])
                 seen.append(better)
+                # too often: no branch fits
                 if len(seen) > TURNS:
                     raise NoBranchError(self._name_of(), pushed=kink.jumps)
             self.p[kink.branch] = better
@@ -109,17 +117,22 @@ class Kinks:
         """The branch that kink k should have; None where it fits."""
         branch, zero = float(self.p[kink.branch]), self.observer.zero
         value = float(values[kink.value])
+        # live: as long as it is at zero
         if branch == LIVE:
             return None if abs(value) <= zero(kink.value) else float(np.sign(value))
+        # slides: as long as both sides push back
         if branch == SLIDES:
             if values[kink.above] < -FULL:
                 return ABOVE
             return BELOW if values[kink.below] < -FULL else None
+        # rests: until something moves
         if branch == RESTS:
             moves = value if abs(value) > zero(kink.value) else self._moves(kink, values)
             return float(np.sign(moves)) if moves else None
+        # well on its side
         if branch * value > zero(kink.value):
             return None
+        # at its surface, and not leaving it
         if branch * value >= -zero(kink.value):
             if kink.rate < 0 or branch * values[kink.rate] >= -zero(kink.rate):
                 return RESTS if kink.jumps and k not in self._tried else None
@@ -133,11 +146,13 @@ class Kinks:
 
     def passing(self, before: Sequence[float], values: Floats) -> float:
         """How long (s) the shortest of the peaks takes that have begun since branches were `before`; inf: none has."""
+        # peaks that have just begun
         begun = [
             kink
             for kink, was in zip(self.kinks, before, strict=True)
             if kink.passage and kink.rate >= 0 and was == BELOW and self.p[kink.branch] == ABOVE
         ]
+        # how long each takes at its rate
         rates = [abs(float(values[kink.rate])) for kink in begun]
         return min((k.passage / rate for k, rate in zip(begun, rates, strict=True) if rate > 0.0), default=np.inf)
 
@@ -151,6 +166,7 @@ class Kinks:
         found = []
         for kink, was in zip(self.kinks, before, strict=True):
             now = float(self.p[kink.branch])
+            # peaks make no entries
             if now != was and not kink.passage:
                 found.append(Happened(t, kink.name, kink.element, WORDS[was], WORDS[now]))
         return found

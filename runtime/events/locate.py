@@ -45,14 +45,17 @@ def crossing(dense: Dense, edges: Edges, begin: float, end: float) -> tuple[floa
     """The first instant, and the numbers of the watches that change there; None where none does.  Where what is found
     turns others may have changed before, and be back at the end.
     """
+    # on a grid: what falls and rises within one part is not seen
     grid = [begin + (end - begin) * k / PARTS for k in range(1, PARTS)] + [end]
     low, before = begin, dense(begin)
     for high in grid:
         values = dense(high)
         hit = _falling(edges, before, values)
+        # the first of those that fall; again as long as others fell before it
         while hit:
             t, which = _first(dense, edges, hit, (low, before), (high, values))
             known, high, values = set(hit), t, dense(t)
+            # nothing earlier
             hit = _falling(edges, before, values)
             if not low < t or known.issuperset(hit):
                 return t, which
@@ -65,9 +68,11 @@ def _falling(edges: Edges, low: Floats, high: Floats) -> list[int]:
     part by its jerk alone), and does not fall at the end, has not: a first step of order 1 may pull it below.
     """
     side, rate = edges.side, edges.rate
+    # what is above zero falls through zero, else through its level
     levels = np.where(side * low[edges.row] > 0.0, 0.0, edges.level)
     fell = np.flatnonzero(side * high[edges.row] - levels < -edges.small)
     side, row, rate, level = side[fell], edges.row[fell], rate[fell], levels[fell]
+    # begins at zero and rises at both ends: no fall
     begins = (rate >= 0) & (side * low[row] <= level + edges.small[fell])
     rises = begins & (np.minimum(side * low[rate], side * high[rate]) >= -edges.still[fell])
     return [int(k) for k in fell[~rises]]
@@ -80,10 +85,12 @@ def _first(
     low: tuple[float, Floats],
     high: tuple[float, Floats],
 ) -> tuple[float, list[int]]:
+    """The first instant at which any of these watches falls through its level, and those that fall there."""
     found = {}
     for k in hit:
         found[k] = _instant(dense, edges, k, low, high)
     first = min(found.values())
+    # to a few units of round-off at one instant
     same = 8.0 * float(np.spacing(max(abs(low[0]), abs(high[0]))))
     return first, [k for k in hit if found[k] <= first + same]
 
@@ -94,14 +101,17 @@ def _instant(dense: Dense, edges: Edges, k: int, low: tuple[float, Floats], high
     """
     row, side, rate = (int(column[k]) for column in (edges.row, edges.side, edges.rate))
     small, level, value = float(edges.small[k]), float(edges.level[k]), side * float(low[1][row])
+    # above zero: zero itself counts
     level = 0.0 if value > 0.0 else level
     begin, value = low[0], value - level
+    # rises first: from its crest on
     if value <= 0.0 and rate >= 0 and side * float(low[1][rate]) > 0.0 > side * float(high[1][rate]):
         lower, upper = ((at, side * float(values[rate])) for at, values in (low, high))
         begin = _root(dense, rate, side, lower, upper)
         top = side * float(dense(begin)[row])
         level = 0.0 if top > 0.0 else level
         value = top - level
+        # even the crest is round-off: by its tolerance
         if value <= 0.0:
             value, level = value + small, level - small
     return _root(dense, row, side, (begin, value), (high[0], side * float(high[1][row]) - level), level)
@@ -120,23 +130,27 @@ def _root(
         if not (a < behind and fa > 0.0):
             return a
         a = behind
+    # Ridders' method: bisection and an exponential factor
     for _ in range(ITERATIONS):
         middle = 0.5 * (a + b)
         if not a < middle < b:
             break
         fm = side * float(dense(middle)[row]) - level
         root = math.sqrt(fm * fm - fa * fb)
+        # the root by Ridders, between the ends
         t = middle + (middle - a) * fm / root if root else middle
         if fm > 0.0:
             a, fa = middle, fm
         else:
             b, fb = middle, fm
+        # outside by round-off: bisection alone
         if a < t < b:
             ft = side * float(dense(t)[row]) - level
             if ft > 0.0:
                 a, fa = t, ft
             else:
                 b, fb = t, ft
+        # the interval is down to round-off
         if b - a <= 2.0 * float(np.spacing(max(abs(a), abs(b)))) or fb == 0.0:
             break
     return b

@@ -40,6 +40,7 @@ Mask = NDArray[np.bool_]
 def mates(plan: Plan, system: System, multiplier: list[int]) -> dict[int, bool]:
     """Contact -> whether it holds for good; multiplier: places of the multipliers in y."""
     asked = [k for k, c in enumerate(plan.contacts) if c.kind == "psi" and c.guard < 0]
+    # one alone has no mate; of large models it costs too much
     if len(asked) < 2 or system.unknowns > LARGE:
         return {}
     before = system.description.switches.active.copy()
@@ -55,10 +56,12 @@ class _Search:
     def __init__(self, plan: Plan, system: System, multiplier: list[int], asked: list[int]) -> None:
         self.contacts, self.system = plan.contacts, system.another("3")
         self.other = np.zeros(self.system.rows, dtype=bool)
+        # rows whose families have constraints of their own
         for _, family, first in self.system.form.groups:
             self.other[first : first + system.description.rows[family].size] = family not in plan.plain
         rows, _, number, _ = switch_rows(system.description, self.system.form)
         row = dict(zip(number.tolist(), rows.tolist(), strict=True))
+        # those that have a row in this form
         self.asked = [k for k in asked if plan.contacts[k].number in row]
         self.rows = np.array([row[plan.contacts[k].number] for k in self.asked], dtype=np.int64)
         self.places = np.array([multiplier[k] for k in self.asked], dtype=np.int64)
@@ -66,6 +69,7 @@ class _Search:
 
     def found(self) -> dict[int, bool]:
         """Of all rounds."""
+        # those in parallel, then those in series, until nothing more is found
         for _ in range(ROUNDS):
             some = self._freeze(blocks=True)
             some = self._freeze(blocks=False) or some
@@ -77,16 +81,19 @@ class _Search:
         """What is alike where the others all block, or conduct, is frozen in the other state; whether there was any."""
         free = np.array([k not in self.frozen for k in self.asked])
         alike = np.ones((int(free.sum()),) * 2, dtype=bool)
+        # in all states of what else holds, at two points of random numbers
         for active in self._states():
             for k in self.asked:
                 active[self.contacts[k].number] = self.frozen.get(k, blocks)
             self.system.description.switches.set(active)
             for seed in (0, 1):
                 alike &= self._alike(seed, free, blocks=blocks)
+            # no two alike
             if not np.triu(alike, 1).any():
                 return False
         number = np.flatnonzero(free)
         done = np.zeros(number.size, dtype=bool)
+        # of each pair the second is superfluous
         for i in range(number.size):
             for j in np.flatnonzero(alike[i] & ~done):
                 if j > i and not done[i]:
@@ -99,12 +106,15 @@ class _Search:
         one of its states) nothing, all, and each by itself.
         """
         asked = [self.contacts[k].number for k in self.asked]
+        # nothing else holds
         none = np.zeros(len(self.system.description.switches.places), dtype=bool)
         other = ~none
         other[asked] = False
+        # all else holds
         yield none.copy()
         if other.any():
             yield other.copy()
+            # each by itself
             for k in np.flatnonzero(other):
                 none[k] = True
                 yield none.copy()
@@ -117,17 +127,22 @@ class _Search:
         with np.errstate(all="ignore"):
             jy, jyd = system.jacobian(0.0, y, yd)
         none = np.zeros((int(free.sum()),) * 2, dtype=bool)
+        # a point that is none
         if not (np.isfinite(jy).all() and np.isfinite(jyd).all()):
             return none
+        # matrices of a step in general position
         full = system.dense(jy) + GENERIC * system.dense(jyd)
         values = full if blocks else self._values(y, yd)
         row, column = factors(full)
         left, sigma, right = singular_decomposition(row[:, None] * full * column)
+        # regular: nothing depends on anything
         some = count(sigma, CERTAIN)
         if some == sigma.size:
             return none
+        # how rows of contacts depend on each other, but for other constraints
         depend = _null_span(left[:, some:] * row[:, None], self.other)[self.rows[free]]
         shared = right[some:].T * column[:, None]
+        # what can be shared at will
         shared = shared[self.places[free]] if blocks else values[self.rows[free]] @ shared
         return _pairs(depend) & _pairs(shared)
 
@@ -143,6 +158,7 @@ class _Search:
 
 def _null_span(vectors: Floats, rows: Mask) -> Floats:
     """What of the span of columns [n, number] is zero in these rows."""
+    # no rows: the whole span
     if not rows.any():
         return vectors
     _, sigma, right = singular_decomposition(vectors[rows])
@@ -153,10 +169,12 @@ def _null_span(vectors: Floats, rows: Mask) -> Floats:
 
 def _pairs(vectors: Floats) -> NDArray[np.bool_]:
     """Which e_k - e_l lie in the span of columns [items, number]."""
+    # an empty span
     if not vectors.shape[1]:
         return np.zeros((vectors.shape[0],) * 2, dtype=bool)
     basis, size, _ = singular_decomposition(vectors)
     basis = basis[:, : count(size, SAME)]
     p = basis @ basis.T
+    # distance of e_k - e_l to the span
     diagonal = np.diag(p)
     return np.asarray(np.abs(diagonal[:, None] + diagonal[None, :] - 2.0 * p - 2.0) < SAME)

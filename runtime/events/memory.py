@@ -28,6 +28,7 @@ class Memory:
         """The places in a state of the contacts of each part; of those without a multiplier together."""
         system, number = self.contacts.system, len(self.contacts.contacts)
         label = components(system.pattern.row, system.pattern.columns_of(), system.unknowns)
+        # by connected parts; -1: without a multiplier
         found = dict[int, list[int]]()
         for k, at in enumerate(self.contacts.multiplier):
             found.setdefault(int(label[at]) if at >= 0 else -1, []).append(k)
@@ -42,6 +43,7 @@ class Memory:
         found = [self._followed.get(key) for key in self._keys(stood, touched)]
         after = list(stood)
         for part, own in zip(self._parts, found, strict=True):
+            # not seen in this part yet
             if own is None:
                 return None
             for k, value in zip(part, own, strict=True):

@@ -44,6 +44,7 @@ class Observer:
     def _rows(self, call: lib.Call | None, t: float) -> Floats:
         self._out[:] = 0.0
         if call is not None:
+            # a function pointer for each compiled block
             if call.rows not in self._functions:
                 self._functions[call.rows] = lib.ROWS(call.rows)
             self._functions[call.rows](c.addressof(call.frame), t, *self._pointers)
@@ -56,6 +57,7 @@ class Observer:
         values = self._rows(self._calls[0], t)
         scale = self.terms = self._rows(self._calls[1], t)
         size = np.maximum(np.abs(values), np.abs(scale))
+        # the largest so far, in groups of one kind
         np.fmax(self.largest, np.where(np.isfinite(size), size, 0.0), out=self.largest)
         for rows in self.groups:
             self.largest[rows] = self.largest[rows].max()

@@ -41,7 +41,7 @@ Point = tuple[Floats, Floats]
 
 
 def once(contacts: Contacts, settle: Settle) -> Settle:
-    """The same, asked once for each active set and point: ways that lead back find what was found there.  Of one that
+    """`settle` asked once for each active set and point: ways that lead back find what was found there. Of one that
     does nothing but answer.
     """
     known = dict[tuple[float, tuple[float, ...], bytes, bytes], tuple[Floats, Floats, Floats] | None]()
@@ -76,14 +76,17 @@ class Pivoting:
         """A consistent point whose active set fits, from the present one; NoActiveSetError."""
         self.contacts.reversed.clear()
         before, turned = (self.contacts.active.copy(), self.contacts.p.copy()), dict[int, set[bool]]()
+        # one-way flows alone first: the cheap way
         found = self._among_flows(t, y, yd, settle) if self._flows else None
         if found is not None:
             return found
         self.contacts.active[:], self.contacts.p[:] = before
         self.contacts.reversed.clear()
+        # then all contacts
         try:
             return self._pivot(t, y, yd, settle, turned)
         except NoActiveSetError:
+            # those that turned both ways: zero may be their value
             self.contacts.open = frozenset(k for k, ways in turned.items() if len(ways) > 1)
             if not self.contacts.open:
                 raise
@@ -98,13 +101,16 @@ class Pivoting:
         return Implicit(self.contacts, self.contacts.system.another("3"))
 
     def _among_flows(self, t: float, y: Floats, yd: Floats, settle: Settle) -> Point | None:
-        """The same where one-way flows alone turn; None: neither turning them nor a short implicit step finds it."""
+        """A consistent point where one-way flows alone turn; None: neither turning them nor a short implicit step finds
+        it.
+        """
         contacts, p, known = self.contacts, self.contacts.p.copy(), self.contacts.observer.largest.copy()
         turned = contacts.active.copy()
         try:
             return self._pivot(t, y, yd, settle, {}, once=True)
         except NoActiveSetError:
             contacts.p[:] = p
+        # behind a short implicit step, then a longer one
         for later in AHEAD:
             contacts.active[:] = turned
             told = self.ahead(t, y, later * contacts.time)
@@ -121,6 +127,7 @@ class Pivoting:
         rows hold (None: at its end).
         """
         self.contacts.apply()
+        # the step's own complementarity problem
         told = self._implicit.after(t + h if at is None else at, y, h)
         if told is None:
             return None
@@ -131,8 +138,8 @@ class Pivoting:
     def _pivot(
         self, t: float, y: Floats, yd: Floats, settle: Settle, turned: dict[int, set[bool]], *, once: bool = False
     ) -> Point:
-        """The same; turned: those that were turned, and whether they held; once: no set is tried twice, nor beside one
-        that contradicts itself.
+        """A consistent point by turning contacts that are wrong; turned: those that were turned, and whether they held;
+        once: no set is tried twice, nor beside one that contradicts itself.
         """
         seen = Counter[tuple[float, ...]]()
         changed: list[int] = []
@@ -140,11 +147,13 @@ class Pivoting:
         block: tuple[NDArray[np.bool_], int, Floats] | None = None
         self.contacts.finite(t, y, yd)
         known = self.contacts.observer.largest.copy()
+        # Murty's pivoting: turn what is wrong until nothing is
         for _ in range(TRIALS * (1 + len(self.contacts.contacts))):
             self.contacts.apply()
             state = self.contacts.state()
             again = state in seen
             seen[state] += 1
+            # been here too often: a circle
             if seen[state] > (1 if once else VISITS):
                 break
             found = self._settled_by(t, y, yd, settle)
@@ -160,6 +169,7 @@ class Pivoting:
             values = self.contacts.observer(t, found[0], found[1])
             struck = self.contacts.impulses(y, found)
             wrong = sorted({*self.contacts.wrongs(values, struck), *self.contacts.backwards(t, y, found)})
+            # complementary
             if not wrong:
                 return found[0], found[1]
             if again:  # driven back by either sense: it does not go through where other constraints hold than before
@@ -172,6 +182,7 @@ class Pivoting:
             block = (self.contacts.active.copy(), wrong[0], values) if several else None
             fewest = min(fewest, len(wrong))
             another = (seen[state] - 1) % len(wrong)  # where the first leads back
+            # the first, or all where they are many
             for k in wrong if several else wrong[another : another + 1]:
                 turned.setdefault(k, set()).add(bool(self.contacts.active[k]))
                 changed.append(k)
@@ -185,9 +196,11 @@ class Pivoting:
         """Whether impulses have done what these inequalities are wrong by: one of effort has stopped what closed, and
         nothing holds it afterwards; one of flow has passed, and nothing goes on.
         """
+        # gaps and frictions do not end with an impulse
         if any(self.contacts.contacts[k].kind != "psi" for k in wrong):
             return False
         held = [k for k in wrong if self.contacts.active[k]]
+        # one that holds has stopped what closed
         if any(found[2][self.contacts.multiplier[k]] <= 0.0 for k in held):
             return False
         passed = self.contacts.passed_impulses(t, y, found)
@@ -200,19 +213,25 @@ class Pivoting:
         yet, that does not: the first that fits, else the first; the active set then is that.
         """
         before, stood, first = self.contacts.active.copy(), self.contacts.state(), None
+        # nearest sets first
         for turned in self._near(before):
+            # one that lets go was passed
             self.contacts.become(stood)
             self.contacts.active[list(turned)] = ~before[list(turned)]
+            # a friction turned: its sense is what it was
             for k in (k for k in turned if self.contacts.contacts[k].kind == "friction"):
                 self.contacts.p[self.contacts.contacts[k].sense] = float(before[k])
                 self.contacts.through.update([k] if before[k] else [])
             self.contacts.apply()
+            # singular, or seen: no use
             open_ = len(turned) <= NEAR and self.singular(t, y, yd)
             if open_ or self.contacts.state() in seen:
                 continue
             found = self._settled_by(t, y, yd, settle)
+            # fits: taken at once
             if found is not None and self.contacts.fits(t, y, found):
                 return found
+            # consistent: kept in case none fits
             if found is not None and first is None:
                 first = found, self.contacts.state()
         if first is None:
@@ -226,10 +245,12 @@ class Pivoting:
         inequality holds, all of them before.
         """
         contacts, frozen = self.contacts.contacts, self.contacts.frozen
+        # inequalities that are free to turn
         free = [k for k, c in enumerate(contacts) if c.kind in ("phi", "psi") and k not in frozen]
         rest = [k for k in free if not before[k]]
         order = rest + [k for k in free if before[k]] + [k for k, c in enumerate(contacts) if c.kind == "friction"]
         nearest = (c for number in range(1, NEAR + 1) for c in combinations(order, number))
+        # none holds: all at once first
         if rest == free:
             return islice(chain([rest], nearest), BESIDE)
         return chain(islice(nearest, BESIDE), [rest] if rest else [])
@@ -239,13 +260,16 @@ class Pivoting:
         that point.  From another it may not: two diodes short a source but where that is zero, and where all block a
         coil beside them has no current.
         """
+        # another point: what contradicted itself may not
         if self._asked is None or self._asked[0] != t or not np.array_equal(self._asked[1], y):
             self._asked = t, y.copy()
             self._contradicts.clear()
         key = self.contacts.state()
+        # contradicted itself at this point before
         if key in self._contradicts:
             return None
         found = settle(t, y, yd)
+        # depends on itself and has no point: remembered
         if found is None and self.singular(t, y, yd):
             self._contradicts.add(key)
         return found

@@ -89,8 +89,10 @@ class Contact:
 
     def word(self, *, holds: bool, up: bool) -> str:
         """How it stands where it holds or does not, with its sense upwards or not."""
+        # a relation that may hold at zero
         if self.hold >= 0:
             return "at zero" if holds else "above" if up else "below"
+        # along a line: with its sense
         if self.kind == "friction":
             return "sticks" if holds else f"slips {'+' if up else '-'}"
         if self.kind == "planar":

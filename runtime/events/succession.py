@@ -63,28 +63,33 @@ class Succession:
             return self._after(t, y, yd, touched, stalled=True)
 
     def _after(self, t: float, y: Floats, yd: Floats, touched: Sequence[int], *, stalled: bool) -> tuple[Point, bool]:
-        """The same from this very point."""
+        """The consistent point behind the event from this very point, and whether its set was sought."""
         restart = self._restart
+        # a new instant: frictions may go through zero again
         self.contacts.through.clear()
         self._guards(t, y, yd)
         stood = self.contacts.state()
+        # what followed the last time, unless time stands still
         known = None if stalled else self._recall_set(t, (y, yd), stood, touched)
         if known is not None:
             return known, False
         y = self.impacts.after(t, y, yd, self._strike, restart.instant.system, blow=self.blow)
         self.blow = False
         values = self.observer(t, y, yd)
+        # what was touched turns first
         for k in touched:
             self._let_through(k, t, y, yd)
             if self.contacts.contacts[k].kind != "phi" or self.contacts.active[k]:
                 self.contacts.turn(k, values)
         self.contacts.apply()
         found = self.determined.fit(t, y, yd, once(self.contacts, restart.struck), touched)
+        # the set may be the old one again
         still = touched if self.contacts.state() == stood else ()
         if self._is_tied(t, found, still):
             found = self._ahead(t, found, self.contacts.state()) or found
         elif not stalled and self._beside_idle(t, found, stood):  # twice at an instant would go round in a circle
             found = self._handed_on(t, found)
+        # sets that impacts do not lead to are remembered
         if not self._impacts:
             self._memory.learn(stood, touched, self.contacts.state())
         return self._close_gaps(t, found), True
@@ -92,9 +97,11 @@ class Succession:
     def _let_through(self, k: int, t: float, y: Floats, yd: Floats) -> None:
         """Whether the value of a relation goes through zero: neither it nor its rate follows the sense at once."""
         contacts, contact = self.contacts, self.contacts.contacts[k]
+        # a relation that holds already goes nowhere
         if contact.hold < 0 or contacts.active[k]:
             return
         ends = self._slipping(k, t, y, yd)
+        # both senses leave it where it is
         least = [self.observer.zero(row) for row in (contact.value, contact.rate)]
         if len(ends) == 2 and (np.abs(ends[0] - ends[1]) <= least).all():
             contacts.through.add(k)
@@ -103,6 +110,7 @@ class Succession:
         """Value and rate of a friction that slips in the sense 1, and -1; fewer where there is no such point."""
         contacts, contact = self.contacts, self.contacts.contacts[k]
         ends, stood = list[Floats](), contacts.state()
+        # in either sense
         for sense in (1.0, -1.0):
             contacts.slip(k, sense)
             contacts.apply()
@@ -113,8 +121,11 @@ class Succession:
         return ends
 
     def driving_friction(self, t: float, y: Floats, yd: Floats, values: Floats) -> str | None:
-        """The same of frictions that slip, and whose bound a reaction tells: it has the sign that its text gives it."""
+        """The name of a friction that slips, and whose bound a reaction tells, that would push along: it has the sign
+        that its text gives it.
+        """
         contacts, zero = self.contacts, self.observer.zero
+        # relations that are free and move
         free = {k for k, c in enumerate(contacts.contacts) if c.hold >= 0 and not contacts.active[k]}
         slips = {k for k in free if abs(values[(row := contacts.contacts[k].value)]) > zero(row)}
         return self.driving(t, y, yd, slips - contacts.finite(t, y, yd)) if slips else None
@@ -131,6 +142,7 @@ class Succession:
         for k, contact in enumerate(self.contacts.contacts):
             if contact.kind == "friction" and (among is None or k in among):
                 ends = self._slipping(k, t, y, yd)
+                # slipping one way accelerates that way: it drives
                 if len(ends) == 2 and ends[0][1] - ends[1][1] > self.observer.zero(contact.rate):
                     return contact.name
         return None
@@ -139,6 +151,7 @@ class Succession:
         """The point with gaps that hold brought to nothing: one that is caught in flight is only nearly closed."""
         values = self.observer(t, *point)
         gaps = [c.value for k, c in enumerate(self.plan.contacts) if c.kind == "phi" and self.contacts.active[k]]
+        # closed to round-off
         if not any(abs(values[gap]) > UNSEEN * self.observer.terms[gap] for gap in gaps):
             return point
         y, yd, done = self._restart.settler.moved(t, *point)
@@ -147,16 +160,20 @@ class Succession:
     def _recall_set(self, t: float, point: Point, stood: tuple[float, ...], touched: Sequence[int]) -> Point | None:
         """The point with the active set that followed when this happened before, where it fits; None where not."""
         after = self._memory.recall(stood, touched)
+        # something new in some part of the model
         if after is None:
             return None
         before = self.contacts.active.copy(), self.p.copy()
+        # the point of that set
         self.contacts.become(after)
         found = self._restart.struck(t, *point)
         if found is not None:
+            # it must fit, and leave nothing open
             fits = self.contacts.fits(t, point[0], found)
             fits = fits and (bool(touched) or self._is_decided(before[0], self.observer(t, *found[:2])))
             if fits and self.determined.leaves(t, *found[:2]) == 0:
                 return found[0], found[1]
+        # back to what stood
         self.contacts.active[:], self.p[:] = before
         self.contacts.apply()
         return None
@@ -166,6 +183,7 @@ class Succession:
         alike at this instant (a diode that conducts beside a capacitor) stays where nothing touched it.
         """
         active, zero = self.contacts.active, self.observer.zero
+        # inequalities that turned
         turned = [k for k in np.flatnonzero(active != before) if self.plan.contacts[k].kind in ("phi", "psi")]
         held = [self.plan.contacts[k] for k in turned if active[k]]
         open_ = [self.plan.contacts[k] for k in turned if not active[k]]
@@ -179,15 +197,17 @@ class Succession:
         """
         values, zero = self.observer(t, *point), self.observer.zero
         contacts = [self.contacts.contacts[k] for k in touched]
+        # relations that slip
         stick = self.contacts.active
         slips = [c for c, sticks in zip(self.plan.contacts, stick, strict=True) if c.kind == "friction" and not sticks]
         idle = any(abs(values[c.value]) <= zero(c.value) and abs(values[c.rate]) <= zero(c.rate) for c in slips)
         return idle or any(c.kind != "phi" or abs(values[c.rate]) <= zero(c.rate) for c in contacts)
 
     def _handed_on(self, t: float, point: Point) -> Point:
-        """The same with the active set that fits a little later, where that fits at t too."""
+        """The point with the active set that fits a little later, where that fits at t too; else the point itself."""
         here = self.contacts.state()
         ahead = self._ahead(t, point, here)
+        # a little later it fits, and at t too
         if ahead is not None and self.contacts.fits(t, ahead[0], (*ahead, np.zeros_like(ahead[0]))):
             return ahead
         self.contacts.become(here)
@@ -222,15 +242,19 @@ class Succession:
                 nowhere.add(state)
             return found
 
+        # ever later, until sets are told apart
         for later in AHEAD:
             time = later * self.contacts.time
             found = self._later(t, time, (y, yd), stood, quickly)
+            # determined: taken
             if found is not None and self.determined.leaves(t, *found) == 0:
                 return found
+            # leaves something open: second best
             if found is not None and open_ is None:
                 open_ = found, self.contacts.active.copy(), self.p.copy()
             self.contacts.active[:], self.p[:] = kept
             self.contacts.apply()
+        # no later instant tells them apart
         if open_ is None:
             return None
         self.contacts.active[:], self.p[:] = open_[1:]
@@ -241,6 +265,7 @@ class Succession:
         """The point at t with the active set that fits `time` (s) later; None where that is the one that stood, or
         none is found `quickly`: it only tells sets apart.
         """
+        # straight on, then with the mean rate
         y, yd = point
         found = self._restart.struck(t + time, y + time * yd, yd)
         # a flow that begins at rest moves by time^2 alone; a gap that such a move closes is another event's

@@ -29,9 +29,12 @@ class Turns:
     def seen(self, t: float, point: Point) -> None:
         """Which of them slip and act there; SolverFailure where one drives."""
         active = self._succession.contacts.active
+        # frictions that have not been seen acting
         left = {k for k in self._of.values() if k not in self._acting and not active[k]}
+        # none left to watch
         if not left or self._succession.restart is None:
             return
+        # one that drives from here on
         drives = self._succession.driving_friction(t, *point, self._observer(t, *point))
         if drives is not None:
             raise SolverFailure("drives", t, 0.0, drives)
@@ -42,9 +45,11 @@ class Turns:
         which turns it back (abs): that is seen again behind it.
         """
         through = {w.relation: k for w in which if (k := self._of.get(w.relation, -1)) >= 0}
+        # a corner turns it back: seen behind it
         if any(w.kink >= 0 for w in which):
             self._acting -= set(through.values())
             return [w for w in which if w.relation not in through]
+        # one that acts and slips must not pass zero
         for k in through.values():
             if k in self._acting and not self._succession.contacts.active[k]:
                 raise SolverFailure("drives", t, 0.0, self._plan.contacts[k].name)

@@ -67,12 +67,15 @@ class Candidates:
 
     def __init__(self, plan: Plan) -> None:
         relations = [k for k, r in enumerate(plan.relations) if r.moves]
+        # relations from either side
         found = [(k, -1, -1, plan.relations[k].row, side, -1, 0, -1) for k in relations for side in (1, -1)]
         ends = [len(found)]
         for k, c in enumerate(plan.contacts):
+            # contacts by the rows that end how they stand
             found += [(-1, k, -1, row, 1, rate, when, sense) for row, rate, when, sense in _of_contact(c)]
         ends.append(len(found))
         for k, kink in enumerate(plan.kinks):
+            # laws by the sides of their branches
             found += [(-1, -1, k, row, side, rate, 0, -1) for row, side, rate in _of_kink(kink)]
         table = np.array(found, dtype=np.int64).reshape(len(found), 8).T
         *columns, self._when, self._sense = table
@@ -91,17 +94,21 @@ class Candidates:
         every = self._all
         related, touched, bent = (part.start < part.stop for part in (self._relations, self._contacts, self._kinks))
         kept = np.zeros(len(every), dtype=bool)
+        # on its side, or on neither
         if related:
             part = self._relations
             kept[part] = every.side[part] * side[every.relation[part]] >= 0.0
+        # for those that hold, those that do not, or both
         if touched:
             part, contact = self._contacts, every.contact[self._contacts]
             stands = np.where(holds[contact], HOLDS, FREE)
             kept[part] = ~out[contact] & ((self._when[part] == 0) | (self._when[part] == stands))
+        # the branch that is on, or its sliding surface
         if bent:
             part, branch = self._kinks, p[self._branch]
             kept[part] = np.where(self._slides, branch == SLIDES, (branch != SLIDES) & (branch != -every.side[part]))
         found = every.select(kept)
+        # a friction's side is its sense
         slips = np.flatnonzero(self._sense[kept] >= 0)
         found.side[slips] = np.where(p[self._sense[kept][slips]] < 0.0, -1, 1)
         return found
@@ -110,12 +117,16 @@ class Candidates:
 def _of_contact(c: Contact) -> list[tuple[int, int, int, int]]:
     """(row, row of its rate, when, place of the sense that is its side) of what is watched of a contact."""
     found: list[tuple[int, int, int, int]] = []
+    # sticks within both bounds, slips until it stops
     if c.kind == "friction":
         found = [(c.upper, -1, HOLDS, -1), (c.lower, -1, HOLDS, -1), (c.value, c.rate, FREE, c.sense)]
+    # within its circle, slips until it stops
     elif c.kind == "planar":
         found = [(c.upper, -1, HOLDS, -1), (c.value, c.rate, FREE, -1)]
+    # a multiplier that turns negative, a value that does
     elif c.kind in ("phi", "psi"):
         found = [(c.multiplier, -1, HOLDS, -1), (c.value, c.rate, FREE, -1)]
+    # a bound that may sink below zero
     if c.moves and c.kind in BOUNDED:
         found.append((c.bound, -1, 0, -1))
     return found

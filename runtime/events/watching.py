@@ -56,7 +56,7 @@ class Watching:
         return self._candidates.now(self.side, contacts.active, contacts.barred | self._frozen, self.p)
 
     def core(self) -> tuple[Any, int]:
-        """The same as the core's array, and how many they are."""
+        """What is watched as the core's array, and how many watches there are."""
         watched = self.all_watched()
         array: Any = (lib.Watch * max(len(watched), 1))()
         columns = np.frombuffer(array, dtype=np.dtype(lib.Watch))[: len(watched)]
@@ -82,6 +82,7 @@ class Watching:
         """
         rows = watched.row
         small, level, still = self.observer.zeros(rows), np.zeros(rows.size), np.zeros(rows.size)
+        # gaps in flight are watched by their own heights
         if self.bounces:
             thrown, number = list(self.bounces), self.observer.largest.size
             height, begins, flies = np.full(number, np.inf), np.zeros(number), np.zeros(number, dtype=bool)
@@ -98,6 +99,7 @@ class Watching:
         largest value of their gap, and when (s) the first of them must have ended; inf where there is none.
         """
         largest = self.observer.largest
+        # bounces that rise less than steps see, and are not over yet
         low = [b for row, b in self.bounces.items() if b.height < unseen * largest[row]]
         low = [b for b in low if t + self.nothing < b.begins + 2.0 * b.flight]
         first = min((b.begins + 2.0 * b.flight for b in low), default=np.inf)
@@ -115,6 +117,7 @@ class Watching:
         """Numbers of the samples at t (one instant by two formulas is one), which are counted."""
         found = []
         for k, s in enumerate(self.plan.sampled):
+            # one instant by two formulas: counted up to now
             while self.span[0] + int(self.next[k]) * s.period <= t + self.nothing:
                 self.next[k] += 1
                 found.append(k)

@@ -21,10 +21,12 @@ def failure(run: Integration, cause: str) -> SolverFailure:
     """The failure of a run at the last accepted point."""
     method = run.method.contents
     lost = run.driver.ledgers.lost
+    # inertia became negative: that is the cause, whatever gave way
     if lost is not None:
         return SolverFailure("inertia", method.t, method.h, None, lost)
     unknown: str | None = None
     row: RowLabel | None = None
+    # the row of the last matrix
     if cause in ("singular", "nonfinite") and 0 <= method.bad_row < run.stepped.rows:
         row = run.stepped.row_label(method.bad_row)
     if cause == "singular":
@@ -35,6 +37,7 @@ def failure(run: Integration, cause: str) -> SolverFailure:
         if names:
             return SolverFailure("singular", method.t, method.h, ", ".join(names[:3]), run.system.row_label(at))
         cause = "newton" if cause == "singular" else cause
+    # which unknown moved most against its weight
     if cause in ("error_test", "step_too_small", "crawl", "newton"):
         unknown = _worst(run)
     return SolverFailure(cause, method.t, method.h, unknown, row, smooth=run.work[1])
@@ -54,6 +57,7 @@ def _null_place(run: Integration) -> tuple[tuple[str, ...], int]:
     jy, jyd = run.system.jacobian(run.method.contents.t, y, yd)
     try:
         with np.errstate(all="ignore"):
+            # the null vector of the pencil, by names
             return null_place(run.system, jy, jyd)
     except NotFiniteError:  # nor need slopes be that lie too far apart (a junction far above its voltage)
         return (), -1
@@ -67,6 +71,7 @@ def _worst(run: Integration) -> str | None:
     with np.errstate(over="ignore", invalid="ignore"):  # a correction that has no bounds
         change = np.abs(lib.reader(method.ee, n) * lib.reader(method.weight, n))
     change = np.where(np.isfinite(change), change, np.inf)
+    # unknowns that the error test does not see
     test = run.told.test
     if (test >= 0).any():
         change[test < 0] = 0.0

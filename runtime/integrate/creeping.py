@@ -39,10 +39,12 @@ class Windows:
 
     def is_strained(self, work: Statistics) -> bool:
         """Whether one has ended in which Newton failed too often."""
+        # the window is not over
         if work.steps < self._end:
             return False
         often = work.newton_failures - self._failed > STRAINED * (work.steps - self._steps)
         self._begin(work)
+        # more failures than a part of its steps
         return often
 
 
@@ -69,12 +71,15 @@ class Creeping:
     def goes_on(self, t: float, work: Statistics) -> bool:
         """Whether it may be asked for more."""
         done = _done(work)
+        # asked every so many steps only
         if work.steps % ASKED and done < self._asked + TRIED * ASKED:
             return True
         self._asked = done
+        # work against progress, by several windows
         for mark in self._marks:
             if done - mark.done < mark.work:
                 continue
+            # too much work for too little of the span
             if t - mark.t < mark.part * self._span:
                 return False
             mark.done, mark.t = done, t

@@ -33,6 +33,7 @@ class Made:
         (lib.core.sd_linear_z_again if self.complex else lib.core.sd_linear_again)(self.linear)
 
     def __del__(self) -> None:
+        # freed by the core that made it
         if getattr(self, "linear", None):
             (lib.core.sd_linear_z_free if self.complex else lib.core.sd_linear_free)(self.linear)
             self.linear = None
@@ -63,6 +64,7 @@ class Factors:
 
     def take(self, pattern: Pattern, order: Order, *, complex_: bool = False) -> Factorisation:
         """One of these, or a new one."""
+        # one of the same pattern that is not in use
         for k, made in enumerate(self.at_hand):
             if made.pattern is pattern and made.complex == complex_ and made.linear:
                 return Factorisation(self.at_hand.pop(k), self)

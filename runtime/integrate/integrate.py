@@ -74,11 +74,13 @@ class Integration:
         self.roles: Roles = origin.roles
         if request.method in ON_UNDERLYING:
             self._solved, self.roles = origin.explicit
+        # the stabilised form weighs its rows q' - f
         if system.form.name == "2":
             self._weigh()
         self._spare()
         self.segments = segments(start.t, request.t_end, None if request.fixed_step else request.stops)
         self.forms = self._condense()
+        # matrices, settlers, then the stepper that uses both
         self._linear()
         at = start.t, self.y, self.yd
         self.settlers = Settlers(system, self.forms, request, self.sizes, self.roles, at)
@@ -89,11 +91,13 @@ class Integration:
         self._put_away()
         system.trim(LARGE)  # what is made now stays, and little of it fits where something was let go
         self._stepper()
+        # what the driver is told: rates of the start, drift, magnitudes
         keeps = self.settlers.keeps
         told = self.start_rate, self._drift(), self.sizes.magnitude
         self.driver = Driver(system, request, self.method, self.settlers.of_trace, keeps, *told)
         if self.forms is not None:
             self.driver.unread = np.asarray(self.forms.settled.unread, dtype=np.int32)
+        # rosenbrock settles within a step where laws are steep
         if self.method.name == "rosenbrock" and system.form.scales and self.forms is None:
             self.method.contents.settle = self.settler.address
         if self.underlying is None and system.form.scales:
@@ -116,6 +120,7 @@ class Integration:
     def _spare(self) -> None:
         """Lets go of what a large model found on its way here, and would find again."""
         if self.system.unknowns > LARGE:
+            # matrices of the start are found again if asked
             if self.origin is not None:
                 self.origin.let_go()
             self.sizes.spare()
@@ -131,6 +136,7 @@ class Integration:
     @contextmanager
     def room_left(self) -> Iterator[None]:
         """What a large run evaluates its condensed points in goes meanwhile; nothing is evaluated there."""
+        # nothing to let go
         if self.forms is None or self.system.unknowns <= LARGE:
             yield
             return
@@ -142,8 +148,10 @@ class Integration:
 
     def _rest_of_start(self) -> None:
         """Lets go of the start of a large run of what is kept, under way; the next one finds it where it is."""
+        # small, whole or steep: its start stays
         if self.system.unknowns <= LARGE or self.forms is None or self.system.form.scales:
             return
+        # rows of the start are written first
         if self.start_rate.size:
             before = time.process_time()
             lib.core.sd_run_advance(self.driver.core, 0, 0.0)
@@ -166,6 +174,7 @@ class Integration:
         """The factors of the rows q' - f; the magnitudes of nu follow them."""
         assert self.origin is not None
         scale = kinematic_scale(self.system, self.sizes.magnitude, self.origin.jy, self.origin.jyd)
+        # other weights: other entries, other magnitudes
         if (scale != self.system.kinematic_scale).any():
             self.system.kinematic_scale[:] = scale
             self.origin.weigh_entries()
@@ -174,6 +183,7 @@ class Integration:
     def _condense(self) -> Forms | None:
         """The forms without what constant sums define; None where all unknowns are integrated."""
         request = self.request
+        # events, redundant constraints and fixed steps read all unknowns
         whole = request.events is not None or request.least_norm or request.fixed_step is not None
         if whole or not request.condense or request.method in ON_UNDERLYING:
             return None
@@ -182,6 +192,7 @@ class Integration:
         found = condense_model(self.system, self.start.t, self.y, self.yd)
         if found is not None:
             assert self.origin is not None
+            # roles of what is kept: once for all runs of one start
             if self.origin.kept is None:
                 self.origin.kept = self._kept_roles(found.stepped.whole, found.stepped.kept)
             self._kept = self.origin.kept
@@ -196,10 +207,12 @@ class Integration:
         return self.system if self.forms is None else self.forms.stepped
 
     def _linear(self) -> None:
+        # explicit methods: a matrix of accelerations
         if self.request.method in ON_UNDERLYING:
             self.underlying = Underlying(self._solved, self.sizes.magnitude, self._factors)
             self.linear, self._order = self.underlying.linear, Order(None)
             return
+        # implicit ones: of the form, or of what is kept of it
         self._order = net_order_of(self.system) if self.forms is None else self.forms.order()
         self._taken = self._factors.take(self.stepped.pattern, self._order)
         self.linear = self._taken.linear
@@ -208,10 +221,12 @@ class Integration:
         """Of radau: in the first step, at most."""
         if self.request.stages is not None:
             return self.request.stages
+        # many stages pay on smooth systems of moderate size
         many = self.stepped.unknowns <= STAGED and not self.system.form.scales
         return 3, lib.STAGES if many else 3
 
     def _stepper(self) -> None:
+        """Makes the method with what the request says of it, and begins it at the start."""
         request = self.request
         first, most = self._stages()
         order = self._order
@@ -221,6 +236,7 @@ class Integration:
         method.h_max = request.fixed_step or request.h_max or LONGEST * (request.t_end - self.start.t)
         method.fixed_h = request.fixed_step or 0.0
         self._tell()
+        # what only some methods are told
         if request.method == "bdf":
             method.max_order = request.max_order
         elif request.method == "radau":
@@ -235,13 +251,16 @@ class Integration:
         if request.method == "energy":
             self._audit = self.system.observer("audit")
             method.audit = None if self._audit is None else c.addressof(self._audit)
+        # projection between steps: of implicit methods of stabilised forms
         self.projection: Settler | None = self.settlers.projection() if self.underlying is None else None
         if self.projection is not None:
             method.project = self.projection.address
         self.method.start(self.start.t, self.y, self.yd)
 
     def _tell(self) -> None:
+        """Says to the method what each unknown that it steps is, and may be off by."""
         kept, found = None, self.roles
+        # of a condensed form only what is kept
         if self.forms is not None:
             kept, found = self.forms.stepped.kept, self._kept
         self.told = Told(self.system, self.request, self.sizes, found, kept)
@@ -268,6 +287,7 @@ class Integration:
 
     def _drift(self) -> int | None:
         """Address of what the last step was off the constraints before its method projected it."""
+        # explicit methods project themselves
         if self.underlying is not None:
             return c.addressof(self.underlying.core.contents) + lib.Underlying.drift.offset
         if self.projection is not None:
@@ -277,6 +297,7 @@ class Integration:
     @property
     def work(self) -> tuple[Statistics, bool]:
         """Counters so far; whether the bdf takes nearly all steps at its highest order: a smooth motion."""
+        # counted before the method was let go
         if self._work is not None:
             return self._work
         method = self.method.contents
@@ -289,6 +310,7 @@ class Integration:
     def statistics(self) -> Statistics:
         """Counters so far; residuals and Jacobians of the settling at output instants not included."""
         method, core = self.method.contents, self.stepped.core
+        # evaluations of the underlying equation are counted apart
         residuals, matrices = (0, 0) if self.underlying is None else self.underlying.evaluations
         return Statistics(
             method.steps,
@@ -308,6 +330,7 @@ class Integration:
         creeping = Creeping(span, method.t, self.statistics(), draft=request.draft, tried=request.tried)
         windows = Windows(request.unstrained, self.statistics()) if request.unstrained else None
         while True:
+            # as many steps as anything may want to look behind
             until = [item.steps_left(method.steps) for item in (creeping, windows, self.exchange) if item is not None]
             if request.max_steps is not None:
                 until.append(max(request.max_steps - method.steps, 1))
@@ -317,15 +340,19 @@ class Integration:
             self.driver.drain(sink)
             self.system.failure.check()
             for settler in self.settlers.both:
+                # a callback that failed ends the run
                 settler.system.failure.check()
             if progress is not None:
                 progress(method.t)
+            # constraints that depend otherwise: others are left out
             if self.exchange is not None and state in (0, 3) and self.exchange.due(failed=state == 3):
                 continue
+            # the core gave up
             if state == 3:
                 if lib.CAUSES[method.cause] in NEWTON and self._resolve_zeros():
                     continue
                 raise place_failure(self, lib.CAUSES[method.cause])
+            # limits of the request: steps, strain, wall time
             if request.max_steps is not None and method.steps >= request.max_steps and method.t < request.t_end:
                 raise failure(self, "max_steps")
             if windows is not None and windows.is_strained(self.statistics()):
@@ -333,10 +360,12 @@ class Integration:
             late = request.max_wall is not None and time.monotonic() - began > request.max_wall
             if late and method.t < request.t_end:
                 raise failure(self, "max_wall")
+            # something watched has changed within the last step
             if state == 4:
                 assert self.pieces is not None
                 self.cpu += self.pieces.event(sink)
                 continue
+            # the end of a piece: a sample, or the end of the segment
             if state == 1 and self.pieces is not None:
                 before = time.process_time()
                 more = self.pieces.sample(sink)
@@ -346,6 +375,7 @@ class Integration:
                 self.driver.drain(sink)
             if state == 1:
                 return next((taken.at for taken in (self.pieces, self.corners) if taken is not None), at)
+            # hardly any progress for the work done
             if not creeping.goes_on(method.t, self.statistics()):
                 raise failure(self, "crawl")
 
@@ -353,6 +383,7 @@ class Integration:
         """Whether a step failed by what round-off leaves of unknowns that are still zero where the terms of their rows
         have grown; then their magnitudes have too, and the method begins anew at the last accepted point.
         """
+        # of a large system the inverse costs too much
         if self.system.unknowns > LARGE:
             return False
         y, yd = self.method.point()
@@ -360,6 +391,7 @@ class Integration:
         self.sizes.share(y)
         self.sizes.resolve_by_rows(self.method.contents.t, y, yd, self.roles.state)
         self.sizes.hand_down()
+        # nothing counts for more than before: no help
         if not (0.5 * self.sizes.sizes_at(y)[1] > before).any():
             return False
         self.method.start(self.method.contents.t, y, yd)
@@ -373,6 +405,7 @@ class Integration:
         self.stepped.core.residual_evaluations = self.stepped.core.jacobian_evaluations = 0
         method = self.method.contents
         at = 0
+        # segment by segment: the text jumps or bends between them
         while True:
             self._rest_of_start()
             at = self._advance(sink, progress, began, at) + 1
@@ -380,6 +413,7 @@ class Integration:
                 break
             before = time.process_time()
             cross(self, self.segments[at])
+            # the last segment: nothing grows behind it
             if at + 1 == len(self.segments) and self.pieces is None and self.corners is None:
                 self.sizes.spare_resolved()
             if self.corners is not None:
@@ -416,6 +450,7 @@ class Integration:
         most = None if self.system.unknowns > LARGE else ceiling(self.system, met, magnitude)
         peaks = None if self.system.unknowns > LARGE else met.copy()
         magnitude, met = (group_maxima(self.system, sizes) for sizes in (magnitude, met))
+        # what events leave open at the end
         self._spare()
         return replace(found, magnitude=magnitude, last=(last, met), ceiling=most, peaks=peaks)
 
@@ -423,6 +458,7 @@ class Integration:
         """Lets go of what stepped, whose work is counted: at the end of a large run the room counts too."""
         self._work = self.work
         ledgers = self.driver.ledgers
+        # magnitudes for the estimate, and the largest for the next run
         for name in ("method", "driver", "told", "linear", "_taken", "settler", "settlers", "projection", "pieces"):
             self.__dict__.pop(name, None)
         ledgers.close()

@@ -41,25 +41,30 @@ class Method:
         self.expanded: Any = None
         self._pairs: tuple[Factorisation, ...] = ()
         self._core: Any = None
+        # radau: a complex pair of matrices for every two stages
         if name == "radau":
             taken = [factors.take(system.pattern, order, complex_=True) for _ in range(stages // 2)]
             self._pairs = tuple(taken)
             pairs = (c.c_void_p * lib.PAIRS)(*self.complex)
             self._core = lib.core.sd_radau_new(c.byref(system.core), linear, pairs, stages)
+        # energy: an explicit method that reads the audit
         elif name == "energy":
             assert underlying is not None
             assert isinstance(system, System)
             audited = system.observed_rows("audit")[1]
             self._core = lib.core.sd_energy_new(c.byref(system.core), underlying.core, system.form.extended, audited)
+        # dopri: on the underlying equation
         elif underlying is not None:
             self._core = lib.core.sd_dopri_new(c.byref(system.core), underlying.core)
         elif name == "rosenbrock":
             self._core = lib.core.sd_rosenbrock_new(c.byref(system.core), linear)
+        # bdf
         else:
             self._core = lib.core.sd_bdf_new(c.byref(system.core), linear)
         if not self._core:
             raise MemoryError
         self._n = system.unknowns
+        # a condensed form: full points by an expansion
         if isinstance(system, Condensed):
             self._n = system.whole.unknowns
             condensed = c.addressof(system.condensed)
@@ -97,6 +102,7 @@ class Method:
 
     def begin(self, y: Floats, yd: Floats) -> None:
         """Notes what no step moves of the point that it starts from."""
+        # what nothing reads stays at the start
         if self.expanded:
             stays = y[self._condensed.unread], yd[self._condensed.unread]
             self._stays = [Stretches(item) if self._n > LARGE else item for item in stays]
@@ -109,6 +115,7 @@ class Method:
         """What gives this point whenever it is asked for: of a large system it holds what is stepped or stays."""
         stepper, number = self.contents.stepper, self._condensed.unknowns if self.expanded else self._n
         y, yd = (lib.reader(item, number).copy() for item in (stepper.y, stepper.yd))
+        # all unknowns are stepped
         if not self.expanded:
             return lambda: (y, yd)
         condensed, (stays, still) = self._condensed, self._stays
@@ -116,12 +123,14 @@ class Method:
         def expanded_system() -> tuple[Floats, Floats]:
             return condensed.expand_point(y, stays), condensed.expand_point(yd, still, rate=True)
 
+        # large: expanded when it is asked for
         if self._n > LARGE:
             return expanded_system
         found = expanded_system()  # before the numbers of another run are put there
         return lambda: found
 
     def __del__(self) -> None:
+        # the expansion points into the method: first
         if getattr(self, "expanded", None):
             lib.core.sd_expanded_free(self.expanded)
         if getattr(self, "_core", None):

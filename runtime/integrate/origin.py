@@ -28,11 +28,13 @@ class Origin:
     def __init__(self, system: System, start: ConsistentState, index: int) -> None:
         self.system, self.start, self.t = system, start, start.t
         y, rate = start.for_form(system)
+        # a large start is brought to the form whenever it is asked for
         self._point = None if system.unknowns > LARGE else (y, rate)
         self._index = index
         self._matrix: tuple[Floats, Floats] | None = None
         rates = self._rates()
         self.yd = np.where(system.differential(rates), rate, 0.0)
+        # a large one has its roles when they are asked for
         if system.unknowns <= LARGE:
             self.roles = roles(system, start.t, rates, index)
         del rates, y, rate
@@ -49,7 +51,7 @@ class Origin:
 
     @property
     def rate(self) -> Floats:
-        """The same of its rates."""
+        """Rates [unknowns] of the start in the form of the system."""
         return (self._point or self.start.for_form(self.system))[1]
 
     def point(self, *, own: bool) -> tuple[Floats, Floats, Floats]:
@@ -68,6 +70,7 @@ class Origin:
 
     def _rates(self) -> Floats:
         """dF/dy' [entries] as roles are told by it."""
+        # of a large one without the other half of the Jacobian
         known = self._matrix is not None or self.system.unknowns <= LARGE
         jyd = self.jyd if known else self.system.slopes(self.t, self.y, self.rate, rate=True)
         return general_rates(self.system, self.t, self.y, self.rate, jyd)
@@ -85,6 +88,7 @@ class Origin:
         return np.where(self.system.are("q", "f"), UNRESOLVED * unresolved_sizes(self.system, self.y, jy), 0.0)
 
     def _entries(self) -> tuple[Floats, Floats]:
+        # kept as long as nobody lets go of it
         if self._matrix is None:
             self._matrix = self.system.jacobian(self.t, self.y, self.rate)
         return self._matrix
@@ -92,17 +96,20 @@ class Origin:
     def let_go(self) -> None:
         """Of the Jacobian and what follows from it: found again if asked."""
         self._matrix = self._sized = None
+        # a large one keeps nothing that can be found again
         if self.system.unknowns > LARGE:
             self.__dict__.pop("least", None)
             self.__dict__.pop("roles", None)
 
     def initial_sizes(self, t_end: float) -> tuple[Floats, float]:
         """Magnitudes of the unknowns and the time scale (s) of the start, of a run to t_end (s)."""
+        # another end has other magnitudes
         if self._sized is None or self._sized[0] != t_end:
             order = net_order_of(self.system)
             far = self.jy, self.jyd, self.yd, order.address
             clean, spent = self.start.without_noise, self.system.unknowns > LARGE
             self._sized = t_end, magnitudes(self.system, self.t, t_end, clean(self.y), self.yd, far, spent=spent)
+            # its entries were overwritten
             if spent:
                 self._matrix = None
         return self._sized[1]
@@ -110,6 +117,7 @@ class Origin:
     @property
     def explicit(self) -> tuple[System, Roles]:
         """What is solved for the slopes, and the roles where flows without a rate are solved for too; of form "0"."""
+        # flows without inertia are solved for, not stepped
         if self._explicit is None:
             solved, _ = underlying_form(self.system, self.start)
             self._explicit = solved, without_rate(self.roles, Accelerations(solved).without_rate)

@@ -73,6 +73,7 @@ class Names(Sequence[str]):
         return int(self._places.size)
 
     def __getitem__(self, at: Any) -> Any:
+        # names of a part
         if isinstance(at, slice):
             return Names(self._system, self._places[at], self._rate[at])
         return self._system.name(int(self._places[at])) + "'" * int(self._rate[at] > 0)
@@ -80,11 +81,14 @@ class Names(Sequence[str]):
 
 def _solved_for(system: System) -> tuple[Ints, Ints, Ints]:
     """Unknown [solved], column [unknowns], rate [solved] of a Selection; flows without a rate are solved for."""
+    # displacements are integrated, all others solved for
     unknown = np.flatnonzero(~system.are("q")).astype(np.int32)
     column = np.full(system.unknowns, -1, dtype=np.int32)
     column[unknown] = np.arange(unknown.size)
+    # flows and momenta by second derivatives, dynamic variables by first
     rate = np.where(system.are("f", "p"), 2, np.where(system.are("s"), 1, 0)).astype(np.int32)
     read = system.structural()[1] & (system.pattern.row < system.form.kinematics + unknown.size)
+    # flows whose rate stands nowhere
     rate[system.are("f") & ~system.differential(read.astype(float))] = 0
     return unknown, column, rate[unknown]
 
@@ -100,19 +104,23 @@ class _Parts:
         number = len(system.form.calls)
         self.calls = (lib.Call * max(number, 1))()
         self.direct = True
+        # blocks that give nothing to the matrix are evaluated without slopes
         for k, planned in enumerate(system.form.calls):
             self.calls[k] = system.calls[k]
             if not algebraic[system.slots_dy(k)].any():
                 self.calls[k].n_dy = 0  # its slopes in y do not stand in the matrix
             elif not planned.block.endswith("_reaction"):
                 self.direct = False
+        # reactions are solved for, not applied
         kept = [k for k, planned in enumerate(system.form.calls) if not planned.block.endswith("_reaction")]
         self.kept = len(kept)
         self.applied = (lib.Call * max(len(kept), 1))(*(system.calls[k] for k in kept))
         self._keep: list[Any] = []
+        # constraints of positions and velocities, for projection
         self.position = self._rows(system, "phi")
         self.velocity = self._rows(system, "phi_rate", "psi", "momentum")
         self.displaced = np.zeros(system.rows, dtype=np.int32)
+        # rows whose constraint reads displacements
         for group, k, first in system.form.groups:
             if group == "phi_acceleration":
                 self.displaced[first : first + system.description.rows[k].size] = 1
@@ -128,8 +136,10 @@ class _Parts:
         if blocks == ("phi",):  # displacements meet constraints whose flows are solved for too
             home = {k: first for group, k, first in system.form.groups if group == "phi_acceleration"}
             found = [(block, replace(place, to=_at_home(place.to, home))) for block, place in found]
+        # a model without such constraints
         if not found:
             return None
+        # calls into the places of the derivatives
         calls = (lib.Call * len(found))()
         for k, (block, place) in enumerate(found):
             calls[k] = system.call(block, place.at, place.to, system.rows)
@@ -160,15 +170,18 @@ class Accelerations:
 
     def _select(self) -> tuple[NDArray[np.bool_], Ints, Ints, Pattern]:
         """Which entries of dF/dy, dF/dy' stand in the matrix, where from, and its pattern."""
+        # rows q' - f are solved by hand
         system = self.system
         pattern, first = system.pattern, system.form.kinematics
         columns = pattern.columns_of()
         in_y, in_rate = system.structural()
         counted = (pattern.row >= first) & (pattern.row < first + self._unknown.size)
+        # a column of a rate takes dF/dy', any other dF/dy
         in_matrix = counted & (self._column[columns] >= 0)
         of_rate = (self._rate > 0)[self._column[columns]]
         take = in_matrix & np.where(of_rate, in_rate, in_y)
         source, from_rate = np.flatnonzero(take).astype(np.int32), of_rate[take].astype(np.int32)
+        # sorted by columns already
         number = self._unknown.size
         start = np.searchsorted(self._column[columns[take]], np.arange(number + 1)).astype(np.int32)
         rows = (pattern.row[take] - first).astype(np.int32)
@@ -192,18 +205,24 @@ class Accelerations:
     def undetermined_unknowns(self, jy: Floats, jyd: Floats) -> Sequence[str]:
         """Unknowns, or x' for their derivatives, that the rows do not determine at a point; none where they do."""
         number = self.pattern.unknowns
+        # nothing to solve for
         if number == 0:
             return ()
+        # small and regular: the usual case
         if number <= SMALL and _regular(self.pattern, self.values(jy, jyd)):
             return ()
+        # large: unknowns that no row can be matched with
         alone = _unmatched_unknowns(self.pattern) if number > DENSE else np.zeros(0)
         if alone.any():
             return self._largest(alone)
+        # equilibrated: the null space does not depend on units
         matrix = _equilibrated_entries(self.pattern, self.values(jy, jyd))
+        # large: by inverse iteration
         if number > DENSE:
             return self._largest(_sparse_null(self.pattern, matrix))
         full = np.zeros((number, number))
         full[self.pattern.row, self.pattern.columns_of()] = matrix
+        # beyond the domain of a law
         if not np.isfinite(full).all():
             return ()
         _, sigma, vectors = singular_decomposition(full)
@@ -224,6 +243,7 @@ class _Core:
     def __init__(self, system: System, linear: Any) -> None:
         self.system, self.held = system, system.held[0]
         self.at: Any = lib.core.sd_underlying_new(c.byref(system.core), linear)
+        # no room in the core
         if not self.at:
             raise MemoryError
 
@@ -249,11 +269,13 @@ class Underlying(Accelerations):
         self._taken = (factors or Factors()).take(self.pattern, self._order)
         self.linear = self._taken.linear
         made = self._taken.made
+        # the core's structure of a run before serves, if rows are held alike
         if made.beside is None or not made.beside.serves(system):
             made.beside = _Core(system, self.linear)
         self.core: Any = made.beside.at
         self._systems(self.core.contents)
         core = self.core.contents
+        # which unknown each column is, and where entries come from
         core.unknown, core.rate, core.column = map(lib.pointer, (self._unknown, self._rate, self._column))
         core.source, core.from_rate = lib.pointer(self._source), lib.pointer(self._from_rate)
         core.magnitude, core.tolerance = lib.pointer(magnitude), 1e-14
@@ -262,6 +284,7 @@ class Underlying(Accelerations):
     def _systems(self, core: Any) -> None:
         """The core's own systems, as rows are held now."""
         parts, system = self._parts, self.system
+        # slopes of all blocks, values without reactions
         self.matrix = lib.System.from_buffer_copy(system.core)
         self.matrix.call = c.addressof(parts.calls)
         self.applied = lib.System.from_buffer_copy(system.core)
@@ -274,6 +297,7 @@ class Underlying(Accelerations):
     def switch(self) -> None:
         """Other rows are held now."""
         for copied in (self.matrix, self.applied):
+            # copies are told which rows are held
             for name in ("held", "clear", "held_row", "held_unknown", "held_slot", "held_rate", "cleared"):
                 setattr(copied, name, getattr(self.system.core, name))
         self._taken.made.beside.held = self.system.held[0]
@@ -282,6 +306,7 @@ class Underlying(Accelerations):
     @property
     def selection(self) -> Selection:
         """The tables of the core's structure."""
+        # the order of elimination is the columns' own where there is none
         calls = range(len(self.system.form.calls))
         return Selection(
             self._unknown,
@@ -316,6 +341,7 @@ class Underlying(Accelerations):
 
     def _answer(self, t: float, cause: int) -> None:
         self.system.failure.check()
+        # the core's cause, as that of a step
         if cause:
             raise SolverFailure(lib.CAUSES[cause], t, 0.0)
 
@@ -326,6 +352,7 @@ def underlying_form(system: System, state: ConsistentState) -> tuple[System, Seq
     That system itself; where coordinates without inertia are in the way, one in which constraints stand as they are.
     """
     missing = obstacle(system, state)
+    # constraints of massless coordinates as they are
     kept = system.once("undifferentiated", lambda: undifferentiated_families(system)) if missing else None
     if kept:
         other = system.another("0/" + ",".join(map(str, kept)))
@@ -336,8 +363,10 @@ def underlying_form(system: System, state: ConsistentState) -> tuple[System, Seq
 
 def rateless(system: System, state: ConsistentState) -> Sequence[str]:
     """What of form 0 has no rate at a state: flows solved for at each stage cost the explicit method its lead."""
+    # flows that are solved for
     massless = Accelerations(system).without_rate
     if massless.any():
+        # their names
         places = np.flatnonzero(massless)
         return Names(system, places, np.zeros_like(places))
     return obstacle(system, state)
@@ -376,12 +405,15 @@ def _sparse_null(pattern: Pattern, values: Floats) -> NDArray[np.float64]:
     from scipy.sparse import csc_array, eye_array
     from scipy.sparse.linalg import splu
 
+    # columns of the pattern
     shape = (pattern.unknowns, pattern.unknowns)
     matrix = csc_array((values, pattern.row, pattern.column), shape=shape)
     try:
         factors = splu(matrix)
+    # exactly singular: next to it
     except RuntimeError:
         factors = splu((matrix + 1e-15 * eye_array(pattern.unknowns)).tocsc())
+    # two steps towards the null vector
     x = factors.solve(factors.solve(np.ones(pattern.unknowns)), trans="T")
     x = factors.solve(x / np.abs(x).max())
     large = np.abs(x).max()

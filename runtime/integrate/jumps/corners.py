@@ -19,6 +19,7 @@ if TYPE_CHECKING:
 
 def serves(run: Integration) -> bool:
     """Whether the core can pass instants of this run: more than one piece, and nothing gains by impulses."""
+    # one piece, events, or large: not here
     if len(run.segments) < 2 or run.pieces is not None or run.system.unknowns > LARGE:
         return False
     whole = run.forms is None or run.settlers.whole_form == "settled"
@@ -62,6 +63,7 @@ class Corners:
         core, sizes = self.core, run.sizes
         core.unknowns, own = run.system.unknowns, sizes.own
         core.magnitude, core.met, core.resolved = map(lib.pointer, (sizes.magnitude, sizes.met, sizes.resolution))
+        # sizes of a method that steps fewer unknowns
         if own is not None:
             core.keeps, core.kept = own[0].size, self._array(own[0], np.int32)
             core.own_magnitude, core.own_met = map(lib.pointer, own[1:])
@@ -76,6 +78,7 @@ class Corners:
         core.constraint, core.balance, core.multiplier, core.flow = (self._array(m, np.uint8) for m in noisy(system))
 
     def _room(self, run: Integration) -> None:
+        """Room for the core: a Jacobian, noise and groups of the unknowns, observed values, points on both sides."""
         core, system = self.core, run.system
         for name in ("jy", "jyd"):
             setattr(core, name, self._array(np.zeros(system.pattern.entries + 1), np.float64))
@@ -84,6 +87,7 @@ class Corners:
         core.seen = self._array(np.zeros(run.driver.observed + 1), np.float64)
         number = max(system.unknowns, system.form.extended) + 8
         y, yd = run.y, run.yd  # what no row reads stays as it is there
+        # two points, and rates
         for name, values in (("y", y), ("yd", yd), ("before", y[:0]), ("before_d", y[:0]), ("rate", y[:0])):
             room = np.zeros(number)
             room[: values.size] = values

@@ -26,17 +26,21 @@ def cross(run: Integration, segment: Segment) -> None:
         run.method.rest()
     y, yd = run.method.point()
     run.sizes.share(y)
+    # the point before the jump, settled to round-off
     with run.settler.exactly():
         y, yd, _ = run.settler.settle(method.t, y[:n], yd[:n])
+        # a row before it only where the trace wants one
         starts = segment.label == run.start.t
         asked = run.driver.asks(segment.label) or starts
         before = run.system.observe(method.t, y, yd) if asked else None
+        # events at the same instant happen first
         if run.pieces is not None:
             found: tuple[Floats, Floats] | None = run.pieces.jump(segment, y, yd)
         else:
             found = run.settlers.across(segment.begin, y, yd)
     if found is None:
         raise failure(run, "newton")
+    # what is observed jumps: rows on both sides
     if before is not None and _jumps(run, before, run.system.observe(segment.begin, *found)):
         if starts:
             run.driver.run.start_kind = TRACE
@@ -59,6 +63,7 @@ def _jumps(run: Integration, before: Floats, behind: Floats) -> bool:
 
 def _row_before(run: Integration) -> None:
     """The row of the end of the last step; events that happen where the text jumps have written theirs."""
+    # without events the core writes it
     if run.pieces is None:
         lib.core.sd_run_row(run.driver.core, TRACE)
     elif not run.driver.run.start_kind:
@@ -70,12 +75,14 @@ def go_on(run: Integration, t: float, label: float, point: list[Floats]) -> None
     the point before it was left (`Driver.leave`).
     """
     n = run.system.form.written
+    # rates go to an array of their own
     if run.pieces is None:  # nobody else has its address
         run.start_rate = np.zeros(run.system.unknowns)
         run.driver.run.start_rate = lib.pointer(run.start_rate)
     y, run.start_rate[:] = np.zeros(run.system.unknowns), 0.0
     run.start_rate[:n] = point.pop()
     y[:n] = run.driver.arrive(t, point.pop(), run.start_rate[:n], run.sizes.magnitude)
+    # the method's step is over; sizes may have grown
     run.method.rest()
     run.sizes.begin_to_move(t, run.method.contents.t_end, y, run.start_rate)
     with run.room_left():

@@ -42,24 +42,29 @@ class Exchange:
         """
         run, switches = self.run, self.run.system.description.switches
         n, method, before = run.system.form.written, run.method.contents, switches.active
+        # looked at after so many steps
         if not failed and method.steps < self._looked + self._steps:
             return False
         y, yd = (values[:n] for values in run.method.point())
         left = np.flatnonzero(~before)
+        # still the best choice
         null = null_space(self._system, method.t, y, yd, left.size)
         passed, self._looked = max(method.steps - self._looked, 1), method.steps
         if null is None or not self._turn_left_out(weight(null[self._members], left), passed):
             return False
         with run.settler.exactly():
+            # another choice of dependent constraints
             y, yd, _ = run.settler.settle(method.t, y, yd)
             active = np.ones_like(before)
             active[chosen(null[self._members])] = False
             self._leave_out(active)
             self._weight, self._steps = 1.0, 1
             found = run.settlers.across(method.t, y, yd)
+        # no point with these: back
         if found is None:
             self._leave_out(before)
             return False
+        # on from there with a new method state
         run.sizes.share(y)
         run.driver.leave(y, yd)
         core = run.driver.run
@@ -79,5 +84,6 @@ class Exchange:
 
     def _leave_out(self, active: NDArray[np.bool_]) -> None:
         self.run.system.description.switches.set(active)
+        # explicit methods have copies of the rows
         if self.run.underlying is not None:
             self.run.underlying.switch()

@@ -51,14 +51,18 @@ class FirstStep:
         motion.
         """
         begin, t, end = step
+        # too short to be divided
         if end - begin <= NARROW * float(np.spacing(end)):
             return 0.0
+        # another piece has begun
         if begin >= self._until:
             self._begin, self._until, self._others = begin, -np.inf, 0
+        # early in the step, where dense output says little: step only there
         if self._others <= FEW and AT_ONCE * self.handler.nothing < t - begin < self._unknown_time(which, step):
             self._others += int(begin != self._begin)
             self._begin, self._until = begin, self._until if self._until > begin else end
             return WIDER * (t - begin)
+        # a value that overshoots within the step and is back
         return (end - begin) / PARTS if self._overshoots(which, begin, end) else 0.0
 
     def at_once(self, which: Sequence[Watched], step: Step) -> bool:
@@ -69,6 +73,7 @@ class FirstStep:
         """How much (s) of the step the dense output says nothing of, but for gaps, which inertia leads."""
         contacts = self.handler.contacts
         gaps = (w.contact >= 0 and contacts.contacts[w.contact].kind == "phi" for w in which)
+        # gaps in flight have inertia: their dense output is right
         flies = all(gap and not contacts.active[w.contact] for gap, w in zip(gaps, which, strict=True))
         return 0.0 if flies else self._part * (step[2] - step[0])
 

@@ -55,6 +55,7 @@ class Impulses:
         """unread: displacements that the run does not integrate; assigned: events assign flows or dynamic variables,
         by impulses from nowhere.
         """
+        # the form in which integrals stand beside what jumps
         self._assigned = assigned
         settled = self.system = system.another("settled")
         over = self._over = integrated(settled)
@@ -62,6 +63,7 @@ class Impulses:
         self._in_y, self._in_rate, (self.rows, self.states) = in_y, in_rate, over.unread
         form, self._moved = settled.another("3").form, np.where(np.isin(over.moved, unread), -1, over.moved)
         self._read = self._may_pulse()
+        # unknowns with inertia: their rates are impulses
         inertia = in_rate & settled.of_groups("dynamics", "gamma")[self._row]
         inertia |= in_y & settled.of_groups("momentum")[self._row] & (settled.kinds == "f")[self._column]
         inert = np.isin(np.arange(settled.unknowns), self._column[inertia])
@@ -69,9 +71,11 @@ class Impulses:
         self._given = over.force | ((settled.kinds == "f") & (self._moved < 0) & ~inert)
         self._pulses = over.pulses(self._moved, self._given)
         open_ = np.isin(np.arange(settled.unknowns), unread)  # their flows are given, their places nobody keeps
+        # rows that balance impulses, rows that hold throughout
         self._balances, self._others = self._by_order(open_)
         forced = np.isin(np.arange(settled.rows), self._row[in_y & over.force[self._column]])
         self._laws = settled.of_groups("gamma") & ~forced  # at each point too where their flows are no pulses
+        # what a jump of them carries: displacements, inertial flows, contents
         self._carries = ((settled.kinds == "q") & ~open_) | inert | over.contents
         held = form.k_q[inert[form.k_f]]
         self._stays = np.isin(np.arange(settled.unknowns), np.concatenate([self.states, held, unread]))
@@ -93,11 +97,13 @@ class Impulses:
         """Rows that impulses meet, integrated over an instant; rows that hold at each point of the rise, none of which
         reads open displacements.
         """
+        # rows whose rates or flows are pulses, rows of integrals themselves
         settled, flow = self.system, (self._moved >= 0)[self._column]
         moved, own = np.zeros((2, settled.rows), dtype=bool)
         moved[self._row[self._in_rate | (self._in_y & flow)]], own[self.rows] = True, True
         own[self._read] = True
         integrated = settled.of_groups("dynamics", "gamma", "psi") | (settled.of_groups("lambda") & ~own)
+        # flows given from outside pulse in rows of velocities too
         told = np.zeros(settled.rows, dtype=bool)
         told[self._row[(self._given & (settled.kinds == "f"))[self._column] & self._in_y]] = True
         integrated |= settled.of_groups("phi_rate") & told
@@ -109,13 +115,17 @@ class Impulses:
         """s+ - s- [states]; zero of what an event assigns.  magnitude [unknowns].  SolverFailure where a power has no
         integral (pulses of flow through a resistance), and where what jumps is no answer of the balances.
         """
+        # what moves less than counts stays
         way, none = behind.y - before.y, np.zeros(self.states.size)
         way[np.abs(way) <= STILL * magnitude] = 0.0
+        # what an event assigns gains nothing by itself
         assigned, way[self.states] = way[self.states] != 0.0, 0.0
+        # nothing that carries jumps
         if not way[self._carries].any():
             return none
         others = self._others | (self._laws & ~self._rows_of_pulses(way))
         found, balanced, faithful = self._straight(before, behind, way, others)
+        # not straight: along the rise as the rows bend it
         if not (balanced and faithful):
             curved = self._gains_along_rise(before, behind, way, (magnitude, others))
             if curved is None and not self._assigned:
@@ -137,10 +147,12 @@ class Impulses:
         """
         p, own = self.system.description.p, self.system.description.p.copy()
         found = []
+        # text and parameters of each side
         for side in sides:
             if (side.p != p).any():
                 p[:] = side.p
             found.append(self.system.jacobian(side.t, y + pulse, side.yd))
+        # parameters as they were
         if (own != p).any():
             p[:] = own
         (jy, jyd), (ky, kyd) = found
@@ -168,13 +180,16 @@ class Impulses:
     def _straight(self, before: Side, behind: Side, way: Floats, others: Mask) -> tuple[Floats, bool, bool]:
         """The gains [states] where all unknowns go straight; whether impulses balance there, and others [rows] hold."""
         gained, balanced, faithful = np.zeros(self.states.size), True, True
+        # Gauss points of the way
         for part in GAUSS:
             y = before.y + part * way
             slopes = self._slopes((before, behind), part, y)
             impulse, met = self._impulse(slopes, way)
             rate = self._rate(terms := self._terms(slopes, way, impulse))
+            # variables that others read must not jump
             self._still(terms, behind.t)
             fast = self._fast(terms, way, impulse)
+            # a pulse of flow in a power: finite only where it vanishes
             if fast.any():
                 with np.errstate(all="ignore"):
                     pulsed = self._terms(self._slopes((before, behind), part, y, fast), way, impulse)
@@ -196,6 +211,7 @@ class Impulses:
     def _still(self, terms: Floats, t: float) -> None:
         """SolverFailure where a dynamic variable that others read has a rate with an impulse: it would jump."""
         rows = self._read
+        # no variable is read by others
         if not rows.size:
             return
         left, size = (self._sums_of_terms(w)[rows] for w in (terms, np.abs(terms)))
@@ -210,6 +226,7 @@ class Impulses:
     def _finite(self, rate: Floats, pulsed: Floats, t: float) -> None:
         """SolverFailure where a rate grows with what is a pulse itself."""
         endless = np.abs(pulsed - rate) > STEEP * np.maximum(np.abs(rate), np.abs(pulsed))
+        # a rate that grows with the pulse itself
         if endless.any():
             raise SolverFailure("endless", t, 0.0, self.system.name(int(self.states[np.argmax(endless)])))
 
@@ -217,6 +234,7 @@ class Impulses:
         """Impulses of forces, and pulses of flows that no displacement tells [unknowns], that rows ask for along the
         way; whether these are met.
         """
+        # impulses that balance the rates of the way, least of all
         pulses = self._pulses
         at = np.flatnonzero(self._balances[pulses.row] & (pulses.column % 2 == 1))
         aim = -self._sums_of_terms(self._terms(slopes, way))
@@ -240,10 +258,12 @@ class Impulses:
         magnitudes [unknowns], rows [rows] that hold at each point.
         """
         (magnitude, others), last = along, None
+        # the way in parts, ever finer, until gains agree
         size = np.maximum(magnitude, np.abs(way))
         for number in PARTS:
             y, gained = self._integrate_rise((before, behind), size, others, number)
             if last is not None and (np.abs(gained - last) <= AGREED * np.abs(gained).max(initial=0.0)).all():
+                # where the rise ends must be the point behind
                 near = np.abs(y - before.y - way) <= AWAY * size
                 return gained if near[self._carries].all() else None
             last = gained
@@ -255,10 +275,12 @@ class Impulses:
         """Y [unknowns] and gains [states] at the end, in a number of steps of the classical Runge-Kutta method."""
         before, behind = sides
         y, gained, step = before.y.copy(), np.zeros(self.states.size), 1.0 / number
+        # rows at each point, moved from one side to the other
         ends = [self.system.residual(behind.t, z, behind.yd) for z in (before.y, behind.y)]
         asked = np.where(others, ends[1] - ends[0], 0.0)
         for k in range(number):
             way, total, gain = np.zeros(y.size), np.zeros(y.size), np.zeros(self.states.size)
+            # classical Runge-Kutta
             for part, weight in ((0.0, 1.0), (0.5, 2.0), (0.5, 2.0), (1.0, 1.0)):
                 at = y + part * step * way
                 slopes = self._slopes(sides, (k + part) * step, at)
@@ -270,6 +292,7 @@ class Impulses:
 
     def _direction(self, slopes: _Slopes, asked: Floats, size: Floats, holds: Mask) -> tuple[Floats, Floats]:
         """What y moves by along the rise, and the impulses [unknowns]: what the rows ask for, at least of all."""
+        # rows of impulses, rows of positions, of what may move
         pulses = self._pulses
         over = np.flatnonzero(self._balances[pulses.row] & ~self._stays[pulses.column // 2])
         here = np.flatnonzero(holds[self._row] & self._in_y & ~self._stays[self._column])

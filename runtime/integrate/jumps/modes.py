@@ -77,6 +77,7 @@ class Told:
 
 def told_of(groups: Sequence[tuple[Assignment, ...]], entries: Sequence[Happened]) -> Told:
     """What a transition is called of which these are the entries; groups: assignments of the first of them."""
+    # assigned values are filled in from the core's log
     assigns, k = [], 0
     for entry, group in zip(entries, groups, strict=False):
         said = ", ".join(f"{a.name.replace('%', '%%')} = %.9g" for a in group)
@@ -95,6 +96,7 @@ def serves(plan: Plan, run: Integration) -> bool:
 
 def _equal(condition: tuple[Any, ...], plan: Plan) -> bool:
     """Whether a condition is true at the instant of a crossing alone."""
+    # an equality of what moves
     if condition[0] == "relation":
         return condition[2] in ("==", "!=") and plan.relations[condition[1]].moves
     return any(_equal(item, plan) for item in condition[1:])
@@ -112,8 +114,10 @@ class Modes:
         self._tried: dict[str, int] = {}
         self._strikes: dict[int, Balance | None] = {}
         self._modes, self._transitions = (lib.Mode * 8)(), (lib.Transition * 16)()
+        # systems whose rows change with the set
         settled = [run.system, run.settler.system, *([run.projection.system] if run.projection else [])]
         self._systems = list({id(s): s for s in settled}.values())
+        # parameters that a mode is told by
         self._fixed = [k.sense for k in plan.contacts if k.sense >= 0] + [k.branch for k in plan.kinks]
         self._fixed += [k.hold for k in plan.contacts if k.hold >= 0]
         self._alone = all(k.hold < 0 for k in plan.contacts)
@@ -141,11 +145,13 @@ class Modes:
         core.observed, core.unknowns = run.driver.observed, run.system.unknowns
 
     def _plan(self, plan: Plan) -> None:
+        """Tells the core of relations, contacts, laws, segments, samples, and of the room for its log."""
         core, handler = self.core, self.handler
         core.p, core.place = lib.pointer(handler.p), self._array(self._fixed, np.int32)
         core.relation_row = self._array([r.row for r in plan.relations], np.int32)
         core.relation_moves = self._array([r.moves for r in plan.relations], np.int32)
         contacts, kinks = (lib.Contact * max(len(plan.contacts), 1))(), (lib.Kink * max(len(plan.kinks), 1))()
+        # frozen contacts follow
         for k, one in enumerate(plan.contacts):
             rows = one.value, one.rate, one.multiplier, one.bound, one.guard, one.sense, one.acceleration
             contacts[k] = lib.Contact(KINDS["follows" if k in handler.contacts.frozen else one.kind], *rows)
@@ -162,15 +168,18 @@ class Modes:
         core.first, core.nothing = handler.span[0], handler.nothing
         core.small, core.largest = SMALL, lib.pointer(handler.observer.largest)
         core.known = lib.pointer(handler.observer.exact)
+        # groups of values of one kind
         alike = handler.observer.groups
         core.alikes, core.alike = len(alike), self._array(np.concatenate([*alike, []]), np.int32)
         core.alike_end = self._array(np.cumsum([g.size for g in alike]), np.int32)
+        # a line of the log holds the values of all assignments of an event
         assigned = sum(len(e.assignments) for e in plan.whens) + sum(len(e.assignments) for e in plan.sampled)
         core.width, core.room = 2 + 2 * max(ROUNDS * assigned, 1), LOG
         self._log = np.zeros((LOG, core.width))
         core.log = lib.pointer(self._log)
 
     def _run(self) -> None:
+        """Tells the core of the run: roles, sizes and magnitudes of its unknowns, room for points and flights."""
         core, run, method, plan = self.core, self.run, self.run.method.contents, self.handler.plan
         extended = max(run.system.unknowns, run.system.form.extended) + 8
         core.still, core.unknown_size, core.round_off = STILL, UNKNOWN, ROUND_OFF
@@ -180,6 +189,7 @@ class Modes:
         core.magnitude, core.resolved = lib.pointer(run.sizes.magnitude), lib.pointer(run.sizes.resolution)
         core.rate = lib.pointer(run.start_rate)
         core.t_end, core.h_max = (c.addressof(method) + getattr(type(method), f).offset for f in ("t_end", "h_max"))
+        # points, values and parameters on both sides of an event
         for name in ("y", "yd", "before", "before_d", "restart", "restart_d"):
             setattr(core, name, self._array(np.zeros(extended)))
         for name in ("values", "low", "high"):
@@ -189,11 +199,13 @@ class Modes:
         self._thrown = np.zeros(run.driver.observed + 1, dtype=np.int32)
         self._flights = [np.zeros(run.driver.observed + 1) for _ in FLIGHT]
         core.thrown = lib.pointer(self._thrown)
+        # gaps in flight
         for name, array in zip(FLIGHT, self._flights, strict=True):
             setattr(core, name, lib.pointer(array))
         core.fastest, core.rest, core.struck = lib.pointer(self.handler.succession.impacts.fastest), plan.rest, -1
         core.early, core.at_once = EARLY.get(run.request.method, 0.0), AT_ONCE * self.handler.nothing
         core.faint = UNSEEN * run.request.rtol if run.request.method == "bdf" else 0.0
+        # transitions of a bounce that any mode may take
         self._anywhere = np.full(core.contacts + 1, -1, dtype=np.int32)
         core.anywhere = lib.pointer(self._anywhere)
         core.exact = self._array(np.zeros(core.relations + 1), np.int32)
@@ -217,18 +229,21 @@ class Modes:
     def inform_handler(self) -> bool:
         """The handler stands where the core does, and knows what has happened; whether any event has."""
         core, handler = self.core, self.handler
+        # a law's branch, or a transition that was learnt
         for row in self._log[: core.logged].tolist():
             handler.happened += (
                 self._entry_of_law(row) if row[1] < 0.0 else self._told[int(row[1])].entries_at(row[0], row[2:])
             )
         some, core.logged = bool(core.logged), 0
         number = core.base if core.now == lib.OWN else core.now
+        # the mode of which the core knows everything
         if number >= 0:
             side, truth, contacts = self._states[number]
             handler.side[:], handler.truth = side, truth.copy()
             handler.contacts.become(contacts)
             handler.caught_up(core.last, core.stalled)
             handler.bounces = self._bounces()
+        # a mode of its own: taken in as another
         if core.now == lib.OWN:
             self.stands()
         return some
@@ -260,14 +275,17 @@ class Modes:
         limit = handler.plan.limit
         core.left = UNLIMITED if limit is None else limit - len(handler.happened)
         self._throw()
+        # a guard that bars contacts is not known to the core
         usual = not handler.contacts.barred.any()
         core.now = self._mode(key) if usual else -1
         return int(core.now)
 
     def _mode(self, key: Any) -> int:
+        """The number of a mode, described to the core where it is met for the first time; -1: one too many."""
         if key in self._number:
             return self._number[key]
         number = len(self._states)
+        # room for modes is bounded
         if number >= MOST:
             return -1
         self._modes = _grow(self._modes, number)
@@ -282,6 +300,7 @@ class Modes:
         handler, held = self.handler, (lib.Held * len(self._systems))()
         watched = handler.all_watched()
         if len(watched) > self._watches:
+            # more watches than there was room for
             self._room(2 * len(watched))
         for k, system in enumerate(self._systems):
             s = system.core
@@ -309,6 +328,7 @@ class Modes:
         """
         (crossed, due), (flipped, point, before) = what, moved
         handler, number = self.handler, len(self._told)
+        # unknown, full, or not determined: not learnt
         if begin < 0 or number >= MANY or not self._is_determined(t, point):
             return
         strike = None if handler.simple else self._strike(t, point)
@@ -316,6 +336,7 @@ class Modes:
         if (strike or flows) and self.run.driver.impulses is not None:
             return  # integrals gain by the impulses
         momenta = self._momenta(t, point) if flows else None
+        # neither an assignment nor an impact that the core could repeat
         if not (handler.simple or strike) or momenta == 0:
             return
         end = self.stands()
@@ -323,8 +344,10 @@ class Modes:
         flat = [a for group in groups for a in group]
         ends = np.cumsum([sum(map(len, r.groups)) for r in handler.rounds])
         same = what[0], what[1], begin, end
+        # too long for the log, or tried before in vain
         if end < 0 or 2 + 2 * len(flat) > self.core.width or self._tried.setdefault(repr(same), 0) >= AGAIN:
             return
+        # a bounce that leaves the set alone: from any mode
         anywhere = strike is not None and begin == end and self._alone
         if anywhere and self._anywhere[handler.struck] >= 0:
             return
@@ -352,6 +375,7 @@ class Modes:
             momenta=momenta,
         )
         self.core.transition = c.addressof(self._transitions)
+        # for all modes, or first in this one's list
         if anywhere:
             self._anywhere[handler.struck] = number
         else:
@@ -361,8 +385,10 @@ class Modes:
     def _strike(self, t: float, point: Any) -> int | None:
         """The address of the impact that has just been, where the core can do the like; None: it cannot."""
         k = self.handler.struck
+        # no impact, or no point behind it
         if k < 0 or point is None:
             return None
+        # equations of one gap, once
         if k not in self._strikes:
             self._strikes[k] = struck(self.handler, k, t, *point)
         one = self._strikes[k]
@@ -372,8 +398,10 @@ class Modes:
         """The address of the rows that momenta follow from; None: the model has none, 0: they do not tell them."""
         restart = self.handler.restart
         assert restart is not None
+        # no momenta
         if not (restart.settler.system.kinds == "p").any():
             return None
+        # how they follow from flows, once
         if -1 not in self._strikes:
             self._strikes[-1] = of_momenta(restart.settler.system, t, *point)
         one = self._strikes[-1]
@@ -382,6 +410,7 @@ class Modes:
     def _is_determined(self, t: float, point: Any) -> bool:
         """Whether the mode leaves nothing open at t (s)."""
         handler = self.handler
+        # no contacts: nothing can be open
         if point is None or not handler.plan.contacts:
             return True
         return bool(handler.determined.leaves(t, *point) == 0)
@@ -393,7 +422,8 @@ class Modes:
 
 
 def _grow(array: Any, number: int) -> Any:
-    """The same structures with room for one more at `number`."""
+    """An array of structures with room for one more at `number`: itself, or a larger copy."""
+    # room enough
     if number < len(array):
         return array
     larger = (array._type_ * (2 * len(array)))()

@@ -62,6 +62,7 @@ class Pieces:
         self.handler.contacts.size(run.sizes.magnitude, run.sizes.time)
         self.handler.contacts.resolution = run.request.rtol
         method = run.method.contents
+        # a rotating friction turns at most a part of a turn a step
         if np.isfinite(plan.turns):
             run.driver.run.turns, method.h_max = plan.turns, min(method.h_max, FOLLOWED * plan.turns)
         method.h_max = min(method.h_max, WATCHED * plan.anywhere)
@@ -71,11 +72,13 @@ class Pieces:
         """The number of the segment."""
         n = run.system.form.written
         before = run.y[:n].copy(), run.start_rate[:n].copy()
+        # samples due at the start: values before them
         if plan.sampled and not start.sampled:
             run.driver.note(start.t, *before)
         self._first(self.handler.begin(start.t, *before, sampled=start.sampled))
         self.modes = Modes(run, self.handler, self._longest) if serves(plan, run) else None
         if self.modes is not None:
+            # the core's own state of passing a peak
             self._passing = self.modes.core
         self._first_step = FirstStep(run, self.handler, self._values)
         self._mode, self._open, self._begun = -1, np.full(run.driver.observed, np.inf), start.t
@@ -97,13 +100,16 @@ class Pieces:
         self._array, number = self.handler.core()
         core = self.run.driver.run
         core.watch, core.watches = c.addressof(self._array), number
+        # the mode that the handler is in now
         if self.modes is not None:
             self._mode = self.modes.stands()
 
     def _inform_handler(self) -> None:
         """The handler knows what the core has done without it."""
+        # nothing to hear of
         if self.modes is None:
             return
+        # a flight ends no more where it was to land
         if self.modes.inform_handler() or self.modes.core.at != self.at:
             self._landing = np.inf
         self._mode, self.at = self.modes.core.now, self.modes.core.at
@@ -122,11 +128,13 @@ class Pieces:
     def _fire(self, t: float, before: tuple[Floats, Floats], due: list[int], which: list[Watched]) -> Point | None:
         """What the handler says, which the core learns."""
         handler, modes = self.handler, self.modes
+        # without modes the handler alone knows
         if modes is None:
             return handler.fire(t, *before, samples=due, which=which)
         crossed, begin, events = modes.places(which), self._mode, len(handler.happened)
         flipped = self._flip_sides(which)
         point = handler.fire(t, *before, samples=due, which=which)
+        # it has become a transition, where the core could do it
         if not (which and handler.stands(which)):
             modes.learn(begin, t, (crossed, due), (flipped, point, events))
         self._mode = modes.stands()
@@ -152,6 +160,7 @@ class Pieces:
         end, sample, near = self._end, self.handler.next_sample(), self.handler.nothing
         if self.modes is not None:
             self.modes.core.segment = end
+        # a sample before the end of the segment, and no later than a landing
         self.run.method.contents.t_end = min(sample if sample < end - near else end, self._landing)
         self.run.driver.run.end_kind = TRACE if sample <= min(end + near, self._landing) else 0
 
@@ -160,8 +169,10 @@ class Pieces:
         run, method = self.run, self.run.method.contents
         method.h_max, before, self._landing = self._longest, self._landing, np.inf
         if run.request.method == "bdf":
+            # bounces too low to be seen: parts of a flight as steps
             flight, self._landing = self.handler.low_flights(t, UNSEEN * run.request.rtol)
             method.h_max = min(flight / PARTS, self._longest)
+        # the next step ends elsewhere
         if self._landing != before:
             self.aim()
 
@@ -174,6 +185,7 @@ class Pieces:
 
     def _in_parts(self, t: float) -> None:
         """Steps from t (s) on are parts of what is being passed."""
+        # a peak is still under way
         if t < self._passing.passed:
             method = self.run.method.contents
             method.h_max = min(self._passing.part, method.h_max)
@@ -204,37 +216,47 @@ class Pieces:
         began = time.process_time()
         run, core, method = self.run, self.run.driver.run, self.run.method.contents
         stepper = method.stepper
+        # what the core has done so far
         self._inform_handler()
         self.handler.before = self.handler.now()
         sides, truth = self.handler.side.copy(), self.handler.truth.copy()
+        # a more accurate dense output, where the method has one
         if stepper.refine:
             _REFINE(stepper.refine)(stepper.self, c.addressof(run.settler.core.contents))
         end, begun = method.t, core.t_from == (self._begun if self.modes is None else self.modes.core.begun)
+        # from where nothing had changed yet
         begin = max(self._from, min(core.t_clear, end))
         reach = core.t_seen
         while True:
             seen = reach if begin < reach < end else end
+            # the first change in the stretch that was looked at
             found = self.handler.first_crossing(self._values, begin, seen)
+            # nothing there: a wider stretch
             if found is None and seen < end:
                 begin, reach = seen, seen + WIDER * (seen - begin)
                 continue
+            # nothing at all: the step counts as it is
             if found is None:
                 self._accept(end, 0, sink)
                 self._watch()
                 return time.process_time() - began
             t, which = found
+            # a zero that round-off decides: looked at again
             if self._by_round_off(which):
                 continue
+            # of the dense output alone: a shorter step
             step = self._first_step.shorter(which, (core.t_from, t, end)) if begun else 0.0
             if step:
                 self.handler.side[:], self.handler.truth = sides, truth  # what changed within it has not yet
                 self._again(core.t_from, step, sink)
                 return time.process_time() - began
             self.handler.observer.know(run.driver.largest())  # what it has met in this flight, whose ends are zeros
+            # the point of the event, to round-off, and what it does
             with run.settler.exactly():
                 before = self._point(t)
                 which += self._crossing_together(t, before, which)
                 point = self._fire(t, before, [], which)
+            # something changes: on from behind it
             if point is not None:
                 kind = 0 if self.handler.kinks.only_peaks(which) else TRACE
                 self._accept(t, kind, sink, which)
@@ -244,15 +266,18 @@ class Pieces:
                 lib.core.sd_modes_pass(c.byref(self._passing), t, end - core.t_from, self.handler.passes)
                 self._go_on(t, point, before, misled=end - core.t_from if misled else 0.0, kind=kind)
                 return time.process_time() - began
+            # nothing changes: look on from here
             begin = t
 
     def _again(self, begin: float, step: float, sink: Sink) -> None:
         """The last step counts for nothing; steps of so many s from where it began, which has its rows."""
         run, core = self.run, self.run.driver.run
+        # the point at which the step began, with its rates
         with run.settler.exactly():
             y, _ = self._point(begin)
         point = y, run.start_rate[: y.size].copy()
         every, core.every_step = core.every_step, 0
+        # without a row of its own
         self._accept(begin, 0, sink)
         self._go_on(begin, point, point, misled=PARTS * step, kind=0)
         core.every_step = every
@@ -264,18 +289,22 @@ class Pieces:
 
     def _crossing_together(self, t: float, point: Point, known: Sequence[Watched] = ()) -> list[Watched]:
         """The relations beside the known ones that cross zero at t (s) too, but for round-off: one instant for all."""
+        # relations not known to cross, that are on a side
         handler = self.handler
         asked = handler.side != 0.0
         asked[[w.relation for w in known if w.relation >= 0]] = False
         step = (t - self._from) / PARTS
+        # none, or no time to fall in
         if not asked.any() or step <= handler.nothing:
             return []
         watched, values = handler.all_watched(), handler.observer(t, *point)
+        # near zero at this instant
         near = np.abs(values[watched.row]) <= SMALL * handler.observer.largest[watched.row]
         near &= (watched.relation >= 0) & np.append(asked, False)[watched.relation]
         if not near.any():
             return []
         watched, low, here = watched.select(near), self._values(t - step), self._values(t)
+        # and falling through it
         rate = watched.side * (low[watched.row] - here[watched.row]) / step
         falls = (rate > 0.0) & (watched.side * here[watched.row] <= rate * handler.nothing)
         return watched.each(falls)
@@ -284,12 +313,15 @@ class Pieces:
         """Whether a relation has crossed zero within what round-off leaves of it, which is then its zero."""
         observer, run = self.handler.observer, self.run
         rows = [w.row for w in which if w.relation >= 0]
+        # large beside what was open: sure
         if not any(observer.largest[row] <= FAINT * self._open[row] for row in rows):
             return False
         method, (y, yd, met) = run.method.contents, run.last()
+        # what round-off leaves open here and now
         last = y, yd, group_maxima(run.system, met)
         step = max((method.t - run.start.t) / max(method.steps, 1), method.h)
         self._open = left_open(run.system, method.t, last, step).quantities
+        # smaller than that is zero from now on
         faint = [row for row in rows if observer.largest[row] < self._open[row]]
         observer.largest[faint] = self._open[faint] / SMALL
         return bool(faint)
@@ -297,11 +329,14 @@ class Pieces:
     def _accept(self, t: float, kind: int, sink: Sink, which: Sequence[Watched] = ()) -> None:
         """The last step counts up to t; rows of before the event are written with the parameters of before."""
         after, contacts = self.handler.now(), self.handler.contacts
+        # rows before the event with the parameters of before
         self.handler.back(self.handler.before)
+        # planar frictions halt at a point just before
         for k in contacts.halting([w.contact for w in which if w.contact >= 0]):
             begin = self.run.driver.run.t_from
             contacts.halt(k, self._values(t - HALT * (t - begin)))
         full = lib.core.sd_run_accept(self.run.driver.core, t, kind)
+        # as many rows as there is room for
         while full:
             self.run.driver.drain(sink)
             full = lib.core.sd_run_drain(self.run.driver.core)
@@ -322,10 +357,12 @@ class Pieces:
         """
         core = self.run.driver.run
         core.start_kind = kind
+        # steps for flights under way, from here on
         self._bounce(t)
         self._begun = t
         if self.modes is not None:
             self.modes.core.begun = t
+        # a step that was misled is repeated shorter
         if misled:
             self._short(t, misled)
         self._in_parts(t)
@@ -350,6 +387,7 @@ class Pieces:
         run, method = self.run, self.run.method.contents
         self._inform_handler()
         end = self._end
+        # the text jumps first, then samples
         jumps = method.t >= end and self.at + 1 < len(run.segments)  # the text, which is first
         due = [] if jumps else self.handler.due(method.t)
         if not due and method.t < end:  # a bounce that has not come back
@@ -357,15 +395,18 @@ class Pieces:
             self.aim()
             self._in_parts(method.t)
             return True
+        # samples due: their point, settled
         if due:
             n = run.system.form.written
             y, yd = run.method.point()
             with run.settler.exactly():
                 y, yd, _ = run.settler.settle(method.t, y[:n], yd[:n])
                 self.handler.before = self.handler.now()
+                # with relations that cross at the same instant
                 point = self._fire(method.t, (y, yd), due, self._crossing_together(method.t, (y, yd)))
             run.driver.drain(sink)
             self.aim()
+            # something changes: on from behind it
             if point is not None:
                 self._go_on(method.t, point, (y, yd))
         return bool(due) and method.t < end
@@ -377,13 +418,17 @@ class Pieces:
         self._inform_handler()
         handler, modes, t, begin = self.handler, self.modes, segment.begin, self._mode
         handler.before, events = handler.now(), len(handler.happened)
+        # samples due, relations that the jump turns, relations that cross
         due, which = handler.due(t), handler.turned_relations(t, y, yd)
         which += self._crossing_together(self.run.method.contents.t, (y, yd), which)
         crossed, flipped = modes.places(which) if modes is not None else [], self._flip_sides(which)
+        # events, or the jump alone
         found = handler.fire(t, y, yd, samples=due, which=which) if due or which else None
         point = found or handler.restart_at_jump(t, y, yd)
+        # the jump becomes a transition too
         if modes is not None and not due:
             modes.learn(begin, t, (crossed, None), (flipped, point, events))
+        # entries at the instant that the text names
         handler.happened[events:] = [replace(h, time=segment.label) for h in handler.happened[events:]]
         if len(handler.happened) > events:
             self.row_before()
@@ -398,6 +443,7 @@ class Pieces:
     def row_before(self) -> None:
         """The row of the end of the last step, with the parameters of before, where it has none in the trace."""
         core, after = self.run.driver.run, self.handler.now()
+        # a row is there already
         if core.every_step or core.end_kind & TRACE or self.run.method.contents.t == self.run.start.t:
             return
         self.handler.back(self.handler.before)

@@ -33,23 +33,29 @@ class Segment:
 
 def segments(t0: float, t1: float, stops: Floats | None) -> tuple[Segment, ...]:
     """The pieces of t0..t1; stops before and behind are left out, that at t0 is where the text jumps behind it."""
+    # one smooth piece
     if stops is None or not np.size(stops):
         return (Segment(t0, t1, t0),)
     inside = np.unique(np.asarray(stops, dtype=np.float64))
     inside = inside[np.isfinite(inside)]
+    # stops closer than rounding are one
     least = CLOSE * max(abs(t0), abs(t1), t1 - t0)
+    # a jump at t0 is behind the start
     found = [Segment(t0, t0, t0)] if (inside == t0).any() else []
     inside = inside[(inside >= t0) & (inside <= t1)]
     begin, label = t0, t0
     k = 0
+    # a group of stops that are one
     while k < inside.size:
         last = k
         while last + 1 < inside.size and inside[last + 1] - inside[last] <= least:
             last += 1
         before, after = float(np.nextafter(inside[k], -np.inf)), float(np.nextafter(inside[last], np.inf))
         first, k = float(inside[last]), last + 1
+        # nothing behind the last one
         if after >= t1:
             after = first = t1
+        # the piece up to just before it
         if before > begin:
             found.append(Segment(begin, before, label))
         begin, label = after, first
@@ -57,5 +63,5 @@ def segments(t0: float, t1: float, stops: Floats | None) -> tuple[Segment, ...]:
 
 
 def core_pieces(pieces: Sequence[Segment]) -> c.Array[Any]:
-    """The same as the core has them (sd_piece)."""
+    """The segments as the core has them (sd_piece)."""
     return (lib.Piece * len(pieces))(*(lib.Piece(s.begin, s.end, s.label) for s in pieces))

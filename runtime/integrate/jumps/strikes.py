@@ -32,26 +32,32 @@ def struck(handler: Handler, k: int, t: float, y: Floats, yd: Floats) -> Balance
     assert handler.restart is not None
     system, contact = handler.restart.settler.system, handler.plan.contacts[k]
     active = handler.contacts.active.copy()
+    # as if contact k alone held
     handler.contacts.active[:] = np.arange(active.size) == k
     handler.contacts.apply()
     try:
         reactions = system.are("kappa", "mu")
         there, acts = np.ones(system.rows, dtype=bool), reactions.copy()
+        # constraints that do not hold do not act
         there[system.held[0]] = acts[system.held[1]] = False
         behind = (system.of_groups("phi_rate", "psi") & there) | system.of_groups("momentum", "gamma")
+        # effort laws that read reactions: friction within an impact
         told = system.of_groups("gamma")[system.pattern.row] & reactions[system.pattern.columns_of()]
         if told.any():
             return None
         first = {(group, family): row for group, family, row in system.form.groups}
         family, position = handler.contacts.switches.places[contact.number]
         row = int(first["phi_rate", multiplier_row(system.description, family)]) + position
+        # only the part of the model that the impulse reaches
         place, over = handler.contacts.multiplier, system.of_groups("dynamics")
         part, rows = _connected_part(system, (behind, over), (system.are("f", "p", "e"), acts), place[k])
         found = Balance(system, (t, y, yd), (behind, over), (part & ~acts, part & acts))
+        # other gaps in that part must not be pushed together
         pushed = np.unique(system.pattern.columns_of()[(rows & over)[system.pattern.row]])
         gaps = np.flatnonzero([c.kind == "phi" for c in handler.plan.contacts])
         found.other_gaps(gaps[np.isin(np.array(place)[gaps], pushed) & (gaps != k)])
         return found.of_gap(k, row, place[k], contact.restitution) if found.ready else None
+    # contacts as they stand
     finally:
         handler.contacts.active[:] = active
         handler.contacts.apply()
@@ -63,11 +69,13 @@ def _connected_part(
     """Unknowns and rows [unknowns], [rows] of the connected part of a multiplier in the equations of `Balance`."""
     (behind, over), (moves, acts) = rows, unknowns
     row, column, (in_y, in_rate) = system.pattern.row, system.pattern.columns_of(), system.structural()
+    # rows behind the impact by what moves, balances by what acts
     joined = in_y & np.where(behind[row], moves[column], over[row] & acts[column])
     joined |= in_rate & over[row] & moves[column]
     label = components(row[joined], column[joined], system.unknowns)
     part = label == label[multiplier]
     there = np.zeros(system.rows, dtype=bool)
+    # rows of that part
     there[row[joined & part[column]]] = True
     return part & (moves | acts), there
 
@@ -92,12 +100,15 @@ class Balance:
     ) -> None:
         self.ready, self._linear, (behind, over), (moves, acts) = False, None, rows, unknowns
         row, column, slopes = system.pattern.row, system.pattern.columns_of(), system.jacobian(*at)
+        # momenta and flows behind, rates of balances, reactions
         parts = [behind[row] & moves[column], over[row] & moves[column], over[row] & acts[column]]
         entries = np.concatenate([np.flatnonzero(part) for part in parts])
         rated = np.repeat([0, 1, 0], [int(part.sum()) for part in parts])
+        # entries that are zero at this point are left out
         some = entries[np.where(rated, slopes[1][entries], slopes[0][entries]) != 0.0]
         own, columns = np.unique(row[some]), np.unique(column[some])
         columns = np.append(columns[moves[columns]], columns[acts[columns]])
+        # not square, empty or large: not here
         if not 0 < columns.size == own.size <= MOST:
             return
         held = system._held
@@ -110,12 +121,16 @@ class Balance:
 
     def other_gaps(self, gaps: Ints) -> None:
         """Other gaps that the impulse reaches."""
+        # only where the balance is complete
         if self.ready:
             self._keep.append(np.ascontiguousarray(gaps, dtype=np.int32))
             self.core.besides, self.core.beside = gaps.size, lib.pointer(self._keep[-1])
 
     def of_gap(self, k: int, row: int, multiplier: int, restitution: float) -> Balance | None:
-        """The same of contact k: its row of flows, the place of its multiplier; None where that has no impulse."""
+        """The balance with the impulse of contact k: its row of flows, the place of its multiplier; None where that
+        has no impulse.
+        """
+        # the gap's multiplier is not in its part
         core, places = self.core, np.flatnonzero(self._columns == multiplier)
         if not places.size:
             return None
@@ -131,13 +146,16 @@ class Balance:
         """The matrix, where its entries stand in the system, room; lines: rows, columns, rows that are integrated."""
         own, columns, integral = lines
         n, core = own.size, self.core
+        # rows and columns numbered among those taken
         number = np.full(system.rows, -1), np.full(system.unknowns, -1)
         number[0][own] = number[1][columns] = np.arange(n)
         i, j = number[0][system.pattern.row[entries]], number[1][system.pattern.columns_of()[entries]]
+        # entries that are in the small matrix
         take = (i >= 0) & (j >= 0)
         pattern, (slots,) = compress(n, n, [Places(i[take], j[take])])
         slot, which = np.zeros((2, pattern.entries), dtype=np.int32)
         slot[slots], which[slots] = entries[take], rated[take]
+        # arrays by which the core fills and solves it
         integers = [
             np.ascontiguousarray(item, dtype=np.int32)
             for item in (columns, own, integral, pattern.column, pattern.row, slot, which)

@@ -28,11 +28,13 @@ def by_sums(settled: System, state: Mask) -> tuple[Mask, Mask]:
     """What follows from the state [unknowns] by constant sums one after the other, and these sums [rows]."""
     rows, columns = settled.pattern.row, settled.pattern.columns_of()
     in_y, in_rate = settled.structural()
+    # rows that are constant sums, without rates
     sums = affine(settled)
     sums[rows[in_rate]] = False
     known = state.copy()
     there = in_y & sums[rows]
     rows, columns = rows[there], columns[there]
+    # each pass finds those with one unknown left
     for _ in range(LONGEST):
         open_ = ~known[columns]
         last = open_ & (np.bincount(rows[open_], minlength=settled.rows) == 1)[rows]

@@ -41,6 +41,7 @@ def _audit_places(system: System) -> Ints:
     """Places of the members of the audit in y, in the order of core/run/run.h; -1 where there is none."""
     found = np.full(7, -1, dtype=np.int32)
     order = ("energy", "kinetic", "potential", "dissipated", "supplied", "constraints", "drift")
+    # families of the audit by the last part of their names
     for k in system.description.families_of("audit"):
         name = system.description.families[k].name.rsplit(".", 1)[-1]
         if name in order:
@@ -68,6 +69,7 @@ class Driver:
         self.observed = system.observed_rows("observe")[1]
         self._left: Side | None = None
         plan = request.events
+        # assignments of events to flows or dynamic variables
         said = () if plan is None else (*(w.assignments for w in plan.whens), *(s.assignments for s in plan.sampled))
         self._assigned = any(a.kind != "discrete" for assignments in said for a in assignments)
         self.unread: Ints = np.zeros(0, dtype=np.int32)
@@ -80,11 +82,13 @@ class Driver:
             self.observed,
             system.observed_rows("audit")[1],
         )
+        # no room in the core
         if not self.core:
             raise MemoryError
         self.ledgers = Ledgers(system)
         run = self.run = self.core.contents
         run.ledgers = self.ledgers.address
+        # least multipliers of redundant constraints
         self._least_norm = LeastNorm(settler.system) if request.least_norm else None
         if self._least_norm is not None:
             run.least_norm = self._least_norm.address
@@ -96,6 +100,7 @@ class Driver:
         run.swift = SWIFT * request.rtol
         self._nothing = round_off_beside(system, magnitude)
         run.nothing = lib.pointer(self._nothing)
+        # rows that need no settling, or only sums, or no integrals
         run.bare = int(not request.audited and shows(system, keeps))
         run.told = CREDIT if not request.audited and self._follows_sums(settler, keeps) else 0
         unread = not request.audited and request.events is None and self._unread
@@ -108,6 +113,7 @@ class Driver:
         self.calls = {name: system.observer(name) for name in ("audit", "observe", "observe_rate", "observe_scale")}
         self.calls["powers"] = system.powers()
         audited = [k for name in ("audit", "ledger") for k in system.description.blocks.get(name, ())]
+        # whether ledgers read rates
         run.rated = int(any(k.rates is None or k.rates for k in audited))
         for name, call in self.calls.items():
             setattr(run, name, None if call is None else c.addressof(call))
@@ -118,6 +124,7 @@ class Driver:
         """Where rows are wanted, and the room for them."""
         run, width = self.run, lib.ROW_HEAD + 2 * self.observed
         self._instants = np.ascontiguousarray(request.instants, dtype=np.float64)
+        # without kinds all instants are rows of the trace
         kinds = request.instant_kinds
         kinds = np.full(self._instants.size, TRACE) if kinds is None else kinds
         self._kinds = np.ascontiguousarray(kinds, dtype=np.int32)
@@ -125,6 +132,7 @@ class Driver:
         run.instants, run.every_step = self._instants.size, int(request.every_step)
         run.sizes_at_steps = 1
         run.glances, run.apart = GLANCES * request.sample_steps, request.apart
+        # a block of rows; short rows of few columns in larger blocks
         self.rows = np.empty((ROOM if width < ROOM else 64, width))
         run.row, run.room = lib.pointer(self.rows), self.rows.shape[0]
 
@@ -132,9 +140,11 @@ class Driver:
         """Watches that steps stay on the branch of a constraint of displacements, where there is one alone."""
         self.branches: int | None = None
         contacts = () if request.events is None else request.events.contacts
+        # gaps and large models have no single branch
         if any(contact.kind == "phi" for contact in contacts) or settler.system.unknowns > FEW:
             return
         rows = np.flatnonzero(settler.left_of(settler.system.of_groups("phi")))
+        # no constraint of displacements, or several
         if rows.size != 1:
             return
         extended = self.system.form.extended
@@ -148,10 +158,12 @@ class Driver:
         and of integrals of powers rows alone tell.
         """
         self.extrema: Floats | None = None
+        # not asked for, or rows alone tell
         if not (request.extrema or request.sample_steps) or self._least_norm is not None or not self._unread:
             return
         rooms = np.zeros((6, max(self.observed, 1)))
         self.extrema = rooms[:2]
+        # least and largest values, and what is looked at within a step
         least, most, *looks, settled = map(lib.pointer, rooms)
         core = self._extrema_core = lib.Extrema(columns=self.observed, least=least, most=most, settled=settled)
         core.watched = int(request.sample_steps)
@@ -162,9 +174,11 @@ class Driver:
     def _follows_sums(self, settler: Settler, keeps: NDArray[np.bool_]) -> bool:
         """Tells the settler by which sums all that a row shows follows from the state, where so and without rates."""
         settled = settler.system
+        # rates are shown, or multipliers are open
         if self.calls["observe_rate"] is not None or self._least_norm is not None or settled.unknowns > LARGE:
             return False  # of a large one the room counts
         known, sums = settled.once(("by sums", keeps.tobytes()), lambda: by_sums(settled, keeps))
+        # sums do not tell all that is shown
         if not shows(self.system, known, OBSERVED):
             return False
         self._sums = settler.left_of(sums)
@@ -180,6 +194,7 @@ class Driver:
 
     def asks(self, t: float) -> bool:
         """Whether the next instant at which the trace wants a row is t (s), and not every step has one."""
+        # no instant left, or a later one
         run = self.run
         if run.every_step or run.next >= run.instants or self._instants[run.next] > t:
             return False
@@ -203,6 +218,7 @@ class Driver:
 
     def arrive(self, t: float, y: Floats, yd: Floats, magnitude: Floats) -> Floats:
         """Y behind the instant at which the point before it was left, with what integrals gain by its impulses."""
+        # nothing gains by impulses
         if self.impulses is None or self._left is None:
             return y
         behind, before, self._left = Side(t, y, yd, self.system.description.p.copy()), self._left, None
@@ -213,6 +229,7 @@ class Driver:
     def drain(self, sink: Sink) -> None:
         """Rows so far go to the sink."""
         run = self.run
+        # rows since the last time
         if run.rows:
             rows = self.rows[: run.rows].copy()
             run.rows = 0  # first: an interruption in between must not hand them over twice
@@ -224,6 +241,7 @@ class Driver:
 
     def __del__(self) -> None:
         if getattr(self, "core", None):
+            # in the order in which they depend on each other
             lib.core.sd_run_free(self.core)
         if getattr(self, "branches", None):
             lib.core.sd_branches_free(self.branches)

@@ -20,9 +20,11 @@ class LeastNorm:
         self.system = settled
         pattern = settled.pattern
         columns = pattern.columns_of()
+        # multipliers, and where they stand in balances
         place = np.flatnonzero(settled.are("kappa", "mu")).astype(np.int32)
         source = np.flatnonzero(settled.of_groups("dynamics")[pattern.row] & np.isin(columns, place))
         rows, coordinate = np.unique(pattern.row[source], return_inverse=True)
+        # [1 A; A' -1] of multipliers and balances
         m, n = place.size, rows.size
         which, behind = np.searchsorted(place, columns[source]), m + coordinate.astype(np.int64)
         every = np.arange(m + n)
@@ -37,6 +39,7 @@ class LeastNorm:
             m + n, *(lib.pointer(item) for item in (self.pattern.column, self.pattern.row, self._keep[-1]))
         )
         self.core: Any = lib.core.sd_least_norm_new(c.byref(settled.core), self.linear, m, n) if self.linear else None
+        # no room in the core
         if not self.core:
             raise MemoryError
         core = self.core.contents

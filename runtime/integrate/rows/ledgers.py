@@ -61,9 +61,11 @@ def _ledger_rows(system: System) -> tuple[list[tuple[str, str, RowLabel]], list[
     element whether it is an inertia.
     """
     description = system.description
+    # of each ledger the first of its rows
     heads = [description.rows[k] for k in description.rows_of("audit")][HEAD::ROWS]
     families = [description.rows[k] for k in description.rows_of("ledger")]
     sizes = [row.size for row in families]
+    # "k inertia ..": the ledger of a family, and what it is
     of = np.array([int(row.kind.split()[0]) for row in families], dtype=np.int32)
     inertia = np.repeat([*("inertia" in row.kind for row in families), False], [*sizes, 1]).astype(np.int8)
     return [(row.label, row.unit, row.label_at(0)) for row in heads], families, of, inertia
@@ -76,6 +78,7 @@ class Ledgers:
         self._heads, self._families, of, self._inertia = system.once("ledgers", lambda: _ledger_rows(system))
         count, elements = len(self._heads), self._inertia.size - 1
         self._end = np.cumsum([row.size for row in self._families], dtype=np.int32)
+        # sums that the core keeps for each ledger, and for each element
         names = ("gross", "largest", "stored", "balance", "highest", "dissipated", "supplied")
         self._arrays = {name: np.zeros(count + 1) for name in names}
         self._arrays |= {name: np.zeros(elements + 1) for name in ("most", "value", "before")}
@@ -101,6 +104,7 @@ class Ledgers:
     def lost(self) -> RowLabel | None:
         """The element whose inertia became negative."""
         found = int(self.core.lost)
+        # none did
         if found < 0:
             return None
         return self._label(found)
@@ -108,6 +112,7 @@ class Ledgers:
     def _label(self, element: int) -> RowLabel:
         """Of an element by its number."""
         for row in self._families:
+            # element numbers run through the families
             if element < row.size:
                 return row.label_at(element)
             element -= row.size
@@ -116,8 +121,10 @@ class Ledgers:
     @property
     def stored(self) -> list[float]:
         """Of each ledger the sum over its elements of what each stored at most."""
+        # kept where the arrays were let go
         if self._stored is not None:
             return self._stored
+        # by families of elements, then by ledgers
         most = [float(part.sum()) for part in np.split(self._arrays["most"][:-1], self._end[:-1])]
         return [sum(most[f] for f in np.flatnonzero(self._of == k)) for k in range(len(self._heads))]
 
@@ -130,6 +137,7 @@ class Ledgers:
 
     def balances(self) -> tuple[Balance, ...]:
         """What came of each ledger."""
+        # instants at which a ledger rose above all before
         records = c.cast(self.core.record, c.POINTER(lib.Record))
         risen: list[list[tuple[float, float]]] = [[] for _ in self._heads]
         for k in range(self.core.records):
@@ -140,9 +148,11 @@ class Ledgers:
     def _balance(self, k: int, stored: float, records: list[tuple[float, float]]) -> Balance:
         label, unit, first = self._heads[k]
         kind, _, title = label.partition(": ")
+        # passed and stored: what the balance is relative to
         passed = float(self._arrays["gross"][k])
         turnover = passed + stored
         value = float(self._arrays["highest"][k])
+        # values beyond all bounds
         highest = max((v for _, v in records), default=0.0) if math.isfinite(value) else math.inf
         element = self._label(int(self._element[k])) if self._element[k] >= 0 else first
         risen = tuple((t, v if math.isfinite(v) else math.inf) for t, v in records)

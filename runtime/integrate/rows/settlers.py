@@ -52,6 +52,7 @@ class Settlers:
         self._common = roles.common[:n]
         t, y, yd = point
         self._point = (t, y[:n], yd[:n]) if system.unknowns <= RATED else None
+        # rows that a point meets, and what the trace shows
         self.settler = self._by_basis(self.settler_of("settled" if forms is not None else self.whole_form))
         self.of_trace = self._by_basis(self.settler_of("valued")) if self._values_do() else self.settler
 
@@ -73,12 +74,16 @@ class Settlers:
     def _values_do(self) -> bool:
         """Whether no row shows a rate that hidden rows alone tell."""
         system, request = self.system, self._request
+        # other rows are shown than those of values
         if not request.valued or request.events or request.least_norm or self._point is None:
             return False
+        # condensed, or with rates
         if self._forms is not None or self.whole_form != "settled":
             return False
+        # a block that does not say whose rates it shows
         shown = [kernel.rates for block in SHOWN for kernel in system.description.blocks.get(block, ())]
         read = [rates for rates in shown if rates is not None]
+        # not said: any
         if len(read) < len(shown):
             return False
         valued, settled = system.another("valued"), system.another("settled")
@@ -103,11 +108,14 @@ class Settlers:
     def whole_form(self) -> str:
         """All rows that hold at a point, with every unknown: where events change them any flow may be open."""
         system = self.system
+        # no form with rates
         if "dynamics_rate" not in system.description.blocks:
             return "settled"
         turning = bool(self._request.events)
+        # constraints that come and go: any flow may be open
         if self._request.switched:
             return "rated"
+        # too large to ask
         if self._point is None:
             return "rated" if turning else "settled"
         settled = system.another("settled")
@@ -118,15 +126,18 @@ class Settlers:
         unknown, whatever leaves the runs.
         """
         form = self.system.form
+        # what leaves the runs is left out of the settled form too
         left = self._forms.settled if self._forms is not None and name == "settled" and not whole else None
         system = self.system.another(name)
         magnitude = self._sizes.magnitude[: form.written]
+        # a group moves together where the run's own state is kept
         common = self._common if state is None else None
         state = self.keeps if state is None else state
         return Settler(system, form.k_span, magnitude, self._sizes.time, state, left, common)
 
     def projection(self) -> Settler | None:
         """Of the constraints alone, onto which accepted points are moved; None where no row lets them drift."""
+        # forms whose rows hold their constraints
         if self.system.form.name not in PROJECTED:
             return None
         return self.settler_of("constraints", np.ones(self.system.form.written, dtype=bool))
@@ -135,6 +146,7 @@ class Settlers:
     def restart(self) -> Restart:
         """Finds consistent points behind jumps, with every unknown."""
         settler = self.settler
+        # behind a jump all unknowns count
         if self._forms is not None:
             settler = self.settler_of(self.whole_form, whole=True)
             settler.by_basis(0.0, determined=True)
@@ -144,6 +156,7 @@ class Settlers:
         """y, yd [unknowns as written] behind a jump at t (s), of the text or a law; where no state jumps, what is left
         of the unknowns tells.  None where no point was found.
         """
+        # where no state jumps, the condensed rows tell
         if self._forms is not None and self.whole_form == "settled":
             found = still(self.settler, t, (y, yd), self.keeps, self._sizes.magnitude[: self.system.form.written])
             if found is not None:
@@ -153,5 +166,6 @@ class Settlers:
     def rest(self) -> None:
         """Of a large system: lets go of the room in which points behind a jump were settled."""
         self.settler.rest()
+        # made only where something jumped
         if "restart" in self.__dict__:
             self.restart.settler.rest()

@@ -21,6 +21,7 @@ def kinematic_scale(system: System, magnitude: Floats, jy: Floats, jyd: Floats) 
     """Factor of each row q' - f; 1 where all displacements have one unit."""
     form = system.form
     size = group_maximum(system, np.abs(own_inertia(system, jy, jyd)))[form.k_f]
+    # no inertia in some rows: by magnitudes instead
     if not (size > 0.0).all() or not np.isfinite(size).all():
         size = np.clip(group_maximum(system, magnitude)[form.k_q], *SQUARED) ** -2.0
     return np.asarray(size / size.min(initial=np.inf))

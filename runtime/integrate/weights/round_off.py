@@ -63,16 +63,20 @@ def left_open(system: System, t: float, last: tuple[Floats, Floats, Floats], ste
     found = LeftOpen(*map(np.zeros_like, beside[0][1:]))
     given = _initial_sizes(system)
     said = given > 0.0
+    # several random errors of the rows
     for change in _changes(system, (t, y, yd), met, step):
+        # more than what the text gave: nothing is known
         if (np.abs(change)[said] > given[said]).any():
             return LeftOpen(*map(np.zeros_like, found))
         opened = [np.full_like(largest, np.inf) for largest in found]
+        # at both places: the smaller effect counts
         for place, *before in beside:
             moved = t, place + change, yd + change / step
             for least, now, was in zip(opened, (system.observe(*moved), system.ledgers(*moved)), before, strict=True):
                 with np.errstate(invalid="ignore"):  # of what has no bounds
                     np.fmin(least, MARGIN * np.abs(now - was), out=least)
             del moved  # of a large system the room counts
+        # the largest effect of all errors
         for largest, least in zip(found, opened, strict=True):
             np.fmax(largest, np.where(np.isfinite(least), least, 0.0), out=largest)
         del change, opened
@@ -94,9 +98,11 @@ def _changes(system: System, point: tuple[float, Floats, Floats], met: Floats, s
     [unknowns]: how large each counts in a row.
     """
     scaled = _scaled_jacobian(system, point, met, step)
+    # no slopes: nothing is said
     if scaled is None:
         return
     entries, of_column, counts = scaled
+    # errors of the size of round-off, in rows that have terms
     for probe in range(PROBES):
         error = EPS * np.where(counts, normal(system.rows, behind=probe * system.rows), 0.0)
         change = of_column * least_norm((system.rows, system.unknowns), entries, error)
@@ -115,6 +121,7 @@ def _scaled_jacobian(
     rows, columns = system.pattern.row, system.pattern.columns_of()
     jy, jyd = system.jacobian(t, y, yd)
     size = np.zeros(system.rows)
+    # terms of each row, by values and by rates
     with np.errstate(all="ignore"):
         terms = np.abs(jy) * met[columns]
         terms += np.abs(jyd) * np.maximum(np.abs(yd), met / step)[columns]
@@ -123,6 +130,7 @@ def _scaled_jacobian(
         jy += jyd
     values = jy
     del terms, jy, jyd  # of a large system the room counts, here and below
+    # beyond the domain of a law
     if not (np.isfinite(values).all() and np.isfinite(size).all()):
         return None
     size, brought = _terms_of_elimination(system, (rows, columns, values), size)
@@ -146,6 +154,7 @@ def _terms_of_elimination(system: System, entries: tuple[Ints, Ints, Floats], si
     """Terms [rows] with those that elimination brings into a row, of the rows that are pivots of its columns; what it
     brings there of each unknown [unknowns].
     """
+    # equilibrated, to tell the pivots of the columns
     rows, columns, values = entries
     row, column = sparse_factors(rows, columns, np.abs(values), (system.rows, system.unknowns))
     with np.errstate(over="ignore"):
@@ -153,6 +162,7 @@ def _terms_of_elimination(system: System, entries: tuple[Ints, Ints, Floats], si
     largest, brought = np.zeros(system.unknowns), np.zeros(system.unknowns)
     np.maximum.at(largest, columns, scaled)
     pivot = (scaled >= PIVOT * largest[columns]) & (values != 0.0)
+    # from row to unknown to row, HOPS times
     for _ in range(HOPS):
         np.maximum.at(brought, columns[pivot], size[rows[pivot]] / np.abs(values[pivot]))
         np.maximum.at(size, rows, np.abs(values) * brought[columns])

@@ -43,6 +43,7 @@ class Sizes:
         self.system, self._start, self._request = system, start, request
         self._origin: Origin | None = origin
         found, self.time = origin.initial_sizes(request.t_end)
+        # the last run has shown that unknowns stay below
         if request.ceiling is not None:
             found = np.minimum(found, request.ceiling)
         self._magnitude: Floats = np.maximum(found, self.least)
@@ -61,20 +62,25 @@ class Sizes:
         others |y| met is held, and magnitudes that are not that.
         """
         assert self._own is not None
+        # away already
         if self._away is not None:
             return
+        # what the method does not step
         other = np.ones(self.system.unknowns, dtype=bool)
         other[whole_of(self._own[0])] = False
         met, magnitude = self.met[other], self.magnitude[other]
+        # magnitudes equal to what was met say nothing more
         apart = Stretches(np.where(magnitude == met, MET, magnitude))
         self._away = Ascents(np.flatnonzero(other).astype(np.int32)), Stretches(met), apart
         self._magnitude = self._met = met[:0].copy()
 
     def _bring_back(self) -> None:
+        # nothing is away
         if self._away is None or self._own is None:
             return
         (other, *others), (kept, magnitude, met) = self._away, self._own
         self._away = None
+        # of what the method steps, then of the others
         self._magnitude, self._met = np.empty(self.system.unknowns), np.empty(self.system.unknowns)
         self._magnitude[whole_of(kept)], self._met[whole_of(kept)] = magnitude, met
         largest, apart = (item.whole for item in others)
@@ -96,6 +102,7 @@ class Sizes:
     def met(self) -> Floats:
         """Largest |y| met [unknowns]; of a condensed form as far as it is shared (`share`)."""
         self._bring_back()
+        # the first time
         if self._met.size < self.system.unknowns:
             self._met = np.zeros(self.system.unknowns)
         return self._met
@@ -112,6 +119,7 @@ class Sizes:
     def _has_grown(self, y: Floats) -> bool:
         """Whether some |y| may be more than twice what it was when asked before; it is as large as now, then."""
         known = self.resolution
+        # powers of two take a quarter of the room
         size, most = (_powers(y), known) if known.dtype == np.int16 else (np.abs(y), 2.0 * known)
         if (size <= most).all():
             return False
@@ -138,6 +146,7 @@ class Sizes:
 
     def sizes_of_method(self, kept: Ints | None) -> tuple[Floats, Floats]:
         """Magnitude and |y| met of the unknowns that the method steps; kept: their places, None: all."""
+        # all unknowns are stepped
         if kept is None:
             return self.magnitude, self.met
         held = Ascents(kept) if self.system.unknowns > LARGE else kept
@@ -146,9 +155,11 @@ class Sizes:
 
     def share(self, y: Floats) -> None:
         """What a method of fewer unknowns knows of their sizes becomes known of all at a point y."""
+        # the method's sizes are those of all
         if self._own is None:
             return
         kept, magnitude, met = whole_of(self._own[0]), *self._own[1:]
+        # what was eliminated is as large as at this point
         for sizes in (self.met, self.magnitude):
             np.maximum(sizes, np.abs(y), out=sizes)
         self.magnitude[kept], self.met[kept] = magnitude, met
@@ -162,6 +173,7 @@ class Sizes:
         """Largest |y| met and magnitude of every unknown; what was eliminated is as large as at the last point y.
         last: in the arrays of the run, which is over.
         """
+        # no sizes besides
         if self._own is None:
             return self.met, self.magnitude
         kept, magnitude, met = whole_of(self._own[0]), *self._own[1:]
@@ -175,13 +187,16 @@ class Sizes:
         """Unknowns that stood at zero so far, and whose rates say only now how large they will be: their size, where it
         is unknown; a part of what their like have been at least, as at the start.
         """
+        # unknowns without nominal value that begin to move
         moves = (rate != 0.0) & self.unnamed
         unknown = moves & (self.met <= ROUND_OFF) & (self.magnitude == UNKNOWN)
+        # their size is unknown: by their rates, and by what moves with t
         if unknown.any():
             with np.errstate(over="ignore"):
                 found, _ = magnitudes(self.system, t, end, y, rate)
             grows = self._grows(t, end, np.where(unknown, 0.0, y), np.where(unknown, 0.0, rate))
             self.magnitude[unknown] = np.maximum(np.maximum(found, grows), self.least)[unknown]
+        # at least a part of the largest of their like
         if (moves & (self.met <= ROUND_OFF * self.met.max(initial=0.0))).any():
             like = group_maximum(self.system, self.met)
             begin = moves & (self.met <= ROUND_OFF * like)
@@ -191,6 +206,7 @@ class Sizes:
         """Magnitudes [unknowns] by what moves with t up to `end` (s): at the very instant at which that begins, rates
         are round-off of it.
         """
+        # no Jacobian of a large system for that
         if self.system.unknowns > LARGE:
             return np.zeros(self.system.unknowns)
         far = *self.system.jacobian(t, y, rate), rate, net_order_of(self.system).address
@@ -201,9 +217,11 @@ class Sizes:
         """No magnitude asks for more than round-off leaves: contents that grew are summed where flows are zero; rate
         [unknowns]: of what has one.
         """
+        # nothing has grown: known already
         if not self._has_grown(y):
             return
         spared = self.system.unknowns > LARGE and self._own is not None
+        # sizes of large systems make room for the Jacobian
         if spared:
             self.hand_down()
             self.put_away()
@@ -215,13 +233,14 @@ class Sizes:
         del jy
         if spared:
             self.system.spare()
+        # a state keeps its size
         open_[roles.state] = 0.0
         self._at_least(open_)
 
     def resolve_by_rows(self, t: float, y: Floats, yd: Floats, carries: NDArray[np.bool_]) -> None:
-        """The same of all that the rows determine, by the inverse of their Jacobian: where steps fail by it.  A state
-        has its size from what it was; one that was never more than what is open (the charge through a diode that
-        blocks, beside large ones) has none.
+        """Raises magnitudes to what is left open of all that the rows determine, by the inverse of their Jacobian:
+        where steps fail by it. A state has its size from what it was; one that was never more than what is open (the
+        charge through a diode that blocks, beside large ones) has none.
         """
         open_ = open_unknowns(self.system, t, y, yd, self.time)
         self._at_least(np.where(carries & (self.sizes_at(y)[0] > open_), 0.0, open_))

@@ -32,6 +32,7 @@ class Told:
         if kept is not None:  # as where their rates are unknowns too: rows q' = f pull at nothing
             self.smooth[roles.smooth & system.are("q")[kept]] = UNPULLED
         self.idle = roles.idle.astype(np.int32) if system.form.scales else None
+        # groups of flows that move together are tested by their differences
         grouped = roles.common >= 0
         apart = request.method == "bdf" or (request.method == "radau" and bool((roles.test[grouped] > 0).all()))
         self.groups = roles.groups() if apart and grouped.any() else None
@@ -41,6 +42,7 @@ class Told:
         core = method.contents
         core.atol, core.magnitude, core.met = map(lib.pointer, (self.atol, self.magnitude, self.met))
         core.test, core.power = lib.pointer(self.test), lib.pointer(self.power)
+        # groups one behind the other
         if self.groups is not None:
             core.common_from, core.common = map(lib.pointer, self.groups)
             core.commons = self.groups[0].size - 1
@@ -50,6 +52,7 @@ class Told:
     def tell_steep(self, method: Method, linear: Any) -> None:
         """Of steep laws: what they may leave open; rows within a step are judged by the magnitudes of all unknowns."""
         linear.contents.idle = lib.pointer(self.idle)
+        # rows judged at the full point
         if method.expanded:
             expanded = method.expanded.contents
             expanded.met, expanded.magnitude = lib.pointer(self._sizes.met), lib.pointer(self._sizes.magnitude)

@@ -76,6 +76,7 @@ class Roles:
 
     def select(self, places: Ints) -> Roles:
         """The roles of these unknowns; a group of which others leave is none."""
+        # groups that lose members are none
         common = self.common
         if (common >= 0).any():
             common = np.where(np.isin(common, np.delete(common, places)), -1, common)
@@ -86,8 +87,10 @@ class Roles:
 def general_rates(system: System, t: float, y: Floats, yd: Floats, jyd: Floats) -> Floats:
     """dF/dyd [entries] for `roles`: of the start, or of a point beside it where inertias vanish at the start alone."""
     flows, displaced = system.are("f"), system.are("q")
+    # no displacements, or no inertia that vanishes here
     if not displaced.any() or not (system.structural()[1] & (jyd == 0.0) & flows[system.pattern.columns_of()]).any():
         return jyd
+    # a point beside the start
     part = 0.5 + 0.5 * uniform(y.size, 0, 0)
     beside = np.where(displaced, y + BESIDE * group_maximum(system, np.abs(y)) * part, y)
     with np.errstate(all="ignore"):
@@ -104,10 +107,12 @@ def roles(system: System, t: float, jyd: Floats, index: int) -> Roles:
     differential = system.differential(jyd)
     smooth = unique(system, jyd)
     state = system.are("q", "p", "s") | (flows & _inertial(system, jyd))
+    # the error test sees states and what has rates
     stepped = state | (flows & differential)  # of index 1 and 0 also those whose rates derived constraints hold
     test = np.where(stepped, np.int8(0), np.int8(-1))
     power = np.zeros(system.unknowns, dtype=np.int8)
     multiplier = system.are("kappa", "mu", "nu")
+    # index 2: multipliers and implicit efforts move with 1/h
     if index >= 2:
         steep = np.zeros(system.unknowns, dtype=bool)
         if system.form.scales:
@@ -117,12 +122,15 @@ def roles(system: System, t: float, jyd: Floats, index: int) -> Roles:
         # plain differences are states (`common`), these are tested as they are
         shared = flows & state & ~smooth
         power[shared] = test[shared] = 1
+    # index 3: multipliers with 1/h^2, flows with 1/h
     if index >= 3:
         power[system.are("kappa", "mu")] = 2
         power[system.are("f", "p") & state] = 1
         test[system.are("f", "p") & state] = 1
+    # nothing has a rate: flows are tested
     if not stepped.any():
         test[flows] = 0
+    # nothing is tested: everything is
     if (test < 0).all():
         test[:] = 0
     idle = multiplier | implicit | (flows & ~differential)
@@ -147,12 +155,15 @@ def _common(system: System, jyd: Floats, shared: NDArray[np.bool_]) -> Ints:
         return np.broadcast_to(np.int32(-1), system.unknowns)
     found = np.full(system.unknowns, -1, dtype=np.int32)
     column, row = system.pattern.columns_of(), system.pattern.row
+    # rows that read rates of shared flows
     there = jyd != 0.0
     read = np.zeros(system.rows, dtype=bool)
     read[row[there & shared[column]]] = True
     there &= read[row]
     row, column, value = row[there], column[there], jyd[there]
+    # components of these rows
     group = components(row, column, system.unknowns)
+    # rows that sum to zero know differences alone
     total = np.bincount(row, value, system.rows), np.bincount(row, np.abs(value), system.rows)
     other = (np.abs(total[0]) > BALANCED * total[1])[row] | ~shared[column]
     good = ~np.isin(group[column], group[column[other]])
