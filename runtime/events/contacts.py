@@ -136,7 +136,7 @@ class Contacts:
         if not holding:
             return struck
         struck, moved = struck.copy(), np.abs(found[0] - y)
-        # what it stopped was no flow
+        # zero where what it stopped was no flow
         for k in holding:
             most = moved[: self._flows[k].size][self._flows[k]].max(initial=0.0)
             if most <= EDGE * self.observer.zero(self.contacts[k].value):
@@ -227,6 +227,7 @@ class Contacts:
     def _direct(self, contact: Contact, along: Floats) -> None:
         """The direction of a slip in the plane, as a flow."""
         size = float(np.hypot(*along))
+        # a slip without direction keeps the last one
         if size > 0.0:
             self.p[list(contact.direction)] = max(BESIDE, self._unresolved_speed(contact)) * along / size
 
@@ -272,7 +273,6 @@ class Contacts:
         asked[plain.number] = plain.wrong(values, impulses, self)
         asked[self._follow] = False
         asked[list(self.frozen)] = False
-        # a slip without direction keeps the last one
         for k in np.flatnonzero(asked).tolist():
             contact = self.contacts[k]
             test = _TESTS.get(contact.kind, Contacts._unilateral)

@@ -141,7 +141,7 @@ class Determined:
         shares = np.argsort(-np.round(part, ALIKE), kind="stable").tolist()
         order = self._lowest_first(t, point, [k for k in shares if part[k] > NOTHING])
         zero = {k: abs(values[(row := contacts.contacts[k].value)]) <= contacts.observer.zero(row) for k in order}
-        # frictions at rest first, then with pivots, then those that carry something
+        # those at zero first, by themselves, then with pivots; then those that are not
         for pivots, small in ((False, True), (True, True), (False, False)):
             for k in sorted(order, key=lambda k: k in turned):
                 # wrong size for this pass, or frozen
@@ -199,11 +199,11 @@ class Determined:
         """
         (y, yd), (other, other_d) = points
         flows = self._moves & told
-        # at rest: nothing that moves may change
+        # what turns is zero: nothing that moves may change
         if small:
             moves = _same(yd, other_d, self._moves & self._rated_unknowns, NOTHING) and _same(y, other, flows, NOTHING)
             return moves or self.contacts.contacts[k].hold < 0
-        # under way: flows and their rates within what counts
+        # it is not: flows and their rates stay within what counts
         least = self.contacts.observer.zero(self.contacts.contacts[k].value) / SAME  # what is less is no flow
         time = self.contacts.time
         size = np.abs(y[: flows.size][flows]).max(initial=least) / time if time > 0.0 else 0.0
@@ -252,7 +252,7 @@ class Determined:
 
 def _index_of(e: Floats, b: Floats) -> int:
     """Of e y' + b y = r, less 1: the power with which the least singular value falls beyond the fastest rate."""
-    # rows with rates by the fastest of these
+    # the fastest rate of rows that have one
     rated, own = np.abs(e).max(axis=1, initial=0.0), np.abs(b).max(axis=1, initial=0.0)
     rates = rated > 0.0
     size = np.where(rates, rated, 1.0)

@@ -158,7 +158,7 @@ class Handler(Watching):
         values = values[self._row]
         if np.isnan(values).any():
             raise SolverFailure("nonfinite", t, 0.0)
-        # what crossed exactly, or jumps at its crossing, is not near
+        # exactly zero by a jump: on neither side; by a crossing: near, as what is almost zero
         exact = values != 0.0
         exact[self._exact] = True
         near = exact & (np.abs(values) <= np.where(self._moves, zeros, 0.0))
@@ -274,7 +274,7 @@ class Handler(Watching):
         here, zeros = self.observer(t, y, yd)[row], self.observer.zeros(row)
         near, rounding = np.abs(here) <= zeros, self.observer.rounding(row, here)
         back = near & (self.side * here < -rounding)
-        # still moving past zero a little later
+        # those that do not cross at t, and move on past zero a little later
         back[crossed] = False
         if back.any():
             step = PART * self.contacts.time

@@ -229,7 +229,7 @@ class Impacts:
         system, aim = blow.system, blow.aim
         aims = np.zeros(system.rows)
         first = {(group, family): row for group, family, row in system.form.groups}
-        # of gaps that bounce alone
+        # only gaps that bounce aim at a speed
         for k in (k for k in struck if aim[k] > 0.0):
             family, position = self.contacts.switches.places[self.contacts.contacts[k].number]
             row = first["phi_rate", multiplier_row(system.description, family)] + position

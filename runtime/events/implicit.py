@@ -67,7 +67,7 @@ class Implicit:
         # beyond the domain of a law
         if not (np.isfinite(matrix).all() and np.isfinite(residual).all()):
             return None
-        # signed so that a value that falls is negative
+        # signed as the values are, which grow along their slopes
         slope = self._sign(t, y, matrix[row], value)[:, None] * matrix[row]
         unit = np.zeros_like(slope)
         unit[np.arange(len(free)), at] = 1.0

@@ -132,7 +132,7 @@ class Kinks:
         # well on its side
         if branch * value > zero(kink.value):
             return None
-        # at its surface, and not leaving it
+        # at its surface: it stays there unless its rate leads away
         if branch * value >= -zero(kink.value):
             if kink.rate < 0 or branch * values[kink.rate] >= -zero(kink.rate):
                 return RESTS if kink.jumps and k not in self._tried else None

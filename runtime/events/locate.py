@@ -55,7 +55,7 @@ def crossing(dense: Dense, edges: Edges, begin: float, end: float) -> tuple[floa
         while hit:
             t, which = _first(dense, edges, hit, (low, before), (high, values))
             known, high, values = set(hit), t, dense(t)
-            # nothing earlier
+            # done where nothing else fell before it
             hit = _falling(edges, before, values)
             if not low < t or known.issuperset(hit):
                 return t, which
@@ -143,7 +143,7 @@ def _root(
             a, fa = middle, fm
         else:
             b, fb = middle, fm
-        # outside by round-off: bisection alone
+        # between the ends, unless round-off puts it outside
         if a < t < b:
             ft = side * float(dense(t)[row]) - level
             if ft > 0.0:

@@ -56,7 +56,7 @@ class _Search:
     def __init__(self, plan: Plan, system: System, multiplier: list[int], asked: list[int]) -> None:
         self.contacts, self.system = plan.contacts, system.another("3")
         self.other = np.zeros(self.system.rows, dtype=bool)
-        # rows whose families have constraints of their own
+        # rows that are no plain sums: what one point says of them may not hold at others
         for _, family, first in self.system.form.groups:
             self.other[first : first + system.description.rows[family].size] = family not in plan.plain
         rows, _, number, _ = switch_rows(system.description, self.system.form)
@@ -69,7 +69,7 @@ class _Search:
 
     def found(self) -> dict[int, bool]:
         """Of all rounds."""
-        # those in parallel, then those in series, until nothing more is found
+        # those in series, then those in parallel, until nothing more is found
         for _ in range(ROUNDS):
             some = self._freeze(blocks=True)
             some = self._freeze(blocks=False) or some
@@ -106,12 +106,12 @@ class _Search:
         one of its states) nothing, all, and each by itself.
         """
         asked = [self.contacts[k].number for k in self.asked]
-        # nothing else holds
         none = np.zeros(len(self.system.description.switches.places), dtype=bool)
         other = ~none
         other[asked] = False
-        # all else holds
+        # nothing else holds
         yield none.copy()
+        # all else holds
         if other.any():
             yield other.copy()
             # each by itself

@@ -147,7 +147,7 @@ class Pivoting:
         block: tuple[NDArray[np.bool_], int, Floats] | None = None
         self.contacts.finite(t, y, yd)
         known = self.contacts.observer.largest.copy()
-        # Murty's pivoting: turn what is wrong until nothing is
+        # principal pivoting: turn what is wrong until nothing is
         for _ in range(TRIALS * (1 + len(self.contacts.contacts))):
             self.contacts.apply()
             state = self.contacts.state()
@@ -203,6 +203,7 @@ class Pivoting:
         # one that holds has stopped what closed
         if any(found[2][self.contacts.multiplier[k]] <= 0.0 for k in held):
             return False
+        # one that lets go was passed
         passed = self.contacts.passed_impulses(t, y, found)
         return all(passed[k] > 0.0 for k in wrong if not self.contacts.active[k])
 
@@ -215,7 +216,6 @@ class Pivoting:
         before, stood, first = self.contacts.active.copy(), self.contacts.state(), None
         # nearest sets first
         for turned in self._near(before):
-            # one that lets go was passed
             self.contacts.become(stood)
             self.contacts.active[list(turned)] = ~before[list(turned)]
             # a friction turned: its sense is what it was

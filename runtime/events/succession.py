@@ -97,7 +97,7 @@ class Succession:
     def _let_through(self, k: int, t: float, y: Floats, yd: Floats) -> None:
         """Whether the value of a relation goes through zero: neither it nor its rate follows the sense at once."""
         contacts, contact = self.contacts, self.contacts.contacts[k]
-        # a relation that holds already goes nowhere
+        # no relation, or one that holds
         if contact.hold < 0 or contacts.active[k]:
             return
         ends = self._slipping(k, t, y, yd)
@@ -197,7 +197,7 @@ class Succession:
         """
         values, zero = self.observer(t, *point), self.observer.zero
         contacts = [self.contacts.contacts[k] for k in touched]
-        # relations that slip
+        # frictions that slip
         stick = self.contacts.active
         slips = [c for c, sticks in zip(self.plan.contacts, stick, strict=True) if c.kind == "friction" and not sticks]
         idle = any(abs(values[c.value]) <= zero(c.value) and abs(values[c.rate]) <= zero(c.rate) for c in slips)

@@ -71,7 +71,7 @@ def _worst(run: Integration) -> str | None:
     with np.errstate(over="ignore", invalid="ignore"):  # a correction that has no bounds
         change = np.abs(lib.reader(method.ee, n) * lib.reader(method.weight, n))
     change = np.where(np.isfinite(change), change, np.inf)
-    # unknowns that the error test does not see
+    # only unknowns that the error test sees
     test = run.told.test
     if (test >= 0).any():
         change[test < 0] = 0.0

@@ -42,9 +42,9 @@ class Windows:
         # the window is not over
         if work.steps < self._end:
             return False
+        # more failures than a part of its steps
         often = work.newton_failures - self._failed > STRAINED * (work.steps - self._steps)
         self._begin(work)
-        # more failures than a part of its steps
         return often
 
 

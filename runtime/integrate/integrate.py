@@ -413,7 +413,7 @@ class Integration:
                 break
             before = time.process_time()
             cross(self, self.segments[at])
-            # the last segment: nothing grows behind it
+            # the last segment: no restart asks for these again
             if at + 1 == len(self.segments) and self.pieces is None and self.corners is None:
                 self.sizes.spare_resolved()
             if self.corners is not None:
@@ -438,6 +438,7 @@ class Integration:
             opening=method.opening if self.request.method in OPENED else 0.0,
             extrema=self.driver.extrema,
         )
+        # what events leave open at the end
         if self.pieces is not None:
             n = self.system.form.written
             y, yd = last()
@@ -450,7 +451,6 @@ class Integration:
         most = None if self.system.unknowns > LARGE else ceiling(self.system, met, magnitude)
         peaks = None if self.system.unknowns > LARGE else met.copy()
         magnitude, met = (group_maxima(self.system, sizes) for sizes in (magnitude, met))
-        # what events leave open at the end
         self._spare()
         return replace(found, magnitude=magnitude, last=(last, met), ceiling=most, peaks=peaks)
 
@@ -458,7 +458,6 @@ class Integration:
         """Lets go of what stepped, whose work is counted: at the end of a large run the room counts too."""
         self._work = self.work
         ledgers = self.driver.ledgers
-        # magnitudes for the estimate, and the largest for the next run
         for name in ("method", "driver", "told", "linear", "_taken", "settler", "settlers", "projection", "pieces"):
             self.__dict__.pop(name, None)
         ledgers.close()

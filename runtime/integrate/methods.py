@@ -41,7 +41,7 @@ class Method:
         self.expanded: Any = None
         self._pairs: tuple[Factorisation, ...] = ()
         self._core: Any = None
-        # radau: a complex pair of matrices for every two stages
+        # radau: a complex matrix for each pair of stages
         if name == "radau":
             taken = [factors.take(system.pattern, order, complex_=True) for _ in range(stages // 2)]
             self._pairs = tuple(taken)

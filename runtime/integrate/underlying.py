@@ -306,7 +306,6 @@ class Underlying(Accelerations):
     @property
     def selection(self) -> Selection:
         """The tables of the core's structure."""
-        # the order of elimination is the columns' own where there is none
         calls = range(len(self.system.form.calls))
         return Selection(
             self._unknown,
@@ -366,7 +365,6 @@ def rateless(system: System, state: ConsistentState) -> Sequence[str]:
     # flows that are solved for
     massless = Accelerations(system).without_rate
     if massless.any():
-        # their names
         places = np.flatnonzero(massless)
         return Names(system, places, np.zeros_like(places))
     return obstacle(system, state)
@@ -405,7 +403,6 @@ def _sparse_null(pattern: Pattern, values: Floats) -> NDArray[np.float64]:
     from scipy.sparse import csc_array, eye_array
     from scipy.sparse.linalg import splu
 
-    # columns of the pattern
     shape = (pattern.unknowns, pattern.unknowns)
     matrix = csc_array((values, pattern.row, pattern.column), shape=shape)
     try:

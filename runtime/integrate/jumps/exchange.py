@@ -47,7 +47,7 @@ class Exchange:
             return False
         y, yd = (values[:n] for values in run.method.point())
         left = np.flatnonzero(~before)
-        # still the best choice
+        # whether another choice would be better by now
         null = null_space(self._system, method.t, y, yd, left.size)
         passed, self._looked = max(method.steps - self._looked, 1), method.steps
         if null is None or not self._turn_left_out(weight(null[self._members], left), passed):

@@ -62,7 +62,7 @@ class FirstStep:
             self._others += int(begin != self._begin)
             self._begin, self._until = begin, self._until if self._until > begin else end
             return WIDER * (t - begin)
-        # a value that overshoots within the step and is back
+        # further below zero than it was ever large: the polynomial bends, not the motion
         return (end - begin) / PARTS if self._overshoots(which, begin, end) else 0.0
 
     def at_once(self, which: Sequence[Watched], step: Step) -> bool:

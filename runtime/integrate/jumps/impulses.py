@@ -189,7 +189,7 @@ class Impulses:
             # variables that others read must not jump
             self._still(terms, behind.t)
             fast = self._fast(terms, way, impulse)
-            # a pulse of flow in a power: finite only where it vanishes
+            # flows that are pulses: a power that grows with them has no integral
             if fast.any():
                 with np.errstate(all="ignore"):
                     pulsed = self._terms(self._slopes((before, behind), part, y, fast), way, impulse)
@@ -226,7 +226,6 @@ class Impulses:
     def _finite(self, rate: Floats, pulsed: Floats, t: float) -> None:
         """SolverFailure where a rate grows with what is a pulse itself."""
         endless = np.abs(pulsed - rate) > STEEP * np.maximum(np.abs(rate), np.abs(pulsed))
-        # a rate that grows with the pulse itself
         if endless.any():
             raise SolverFailure("endless", t, 0.0, self.system.name(int(self.states[np.argmax(endless)])))
 

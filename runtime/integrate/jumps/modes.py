@@ -243,7 +243,7 @@ class Modes:
             handler.contacts.become(contacts)
             handler.caught_up(core.last, core.stalled)
             handler.bounces = self._bounces()
-        # a mode of its own: taken in as another
+        # a mode that the core has made by itself: described anew
         if core.now == lib.OWN:
             self.stands()
         return some

@@ -62,7 +62,7 @@ class Pieces:
         self.handler.contacts.size(run.sizes.magnitude, run.sizes.time)
         self.handler.contacts.resolution = run.request.rtol
         method = run.method.contents
-        # a rotating friction turns at most a part of a turn a step
+        # signals that events read are followed from one extreme to the next
         if np.isfinite(plan.turns):
             run.driver.run.turns, method.h_max = plan.turns, min(method.h_max, FOLLOWED * plan.turns)
         method.h_max = min(method.h_max, WATCHED * plan.anywhere)
@@ -109,7 +109,7 @@ class Pieces:
         # nothing to hear of
         if self.modes is None:
             return
-        # a flight ends no more where it was to land
+        # something happened: no landing is awaited any more
         if self.modes.inform_handler() or self.modes.core.at != self.at:
             self._landing = np.inf
         self._mode, self.at = self.modes.core.now, self.modes.core.at
@@ -362,7 +362,7 @@ class Pieces:
         self._begun = t
         if self.modes is not None:
             self.modes.core.begun = t
-        # a step that was misled is repeated shorter
+        # steps behind one that was misled are short
         if misled:
             self._short(t, misled)
         self._in_parts(t)

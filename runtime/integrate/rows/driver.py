@@ -132,7 +132,7 @@ class Driver:
         run.instants, run.every_step = self._instants.size, int(request.every_step)
         run.sizes_at_steps = 1
         run.glances, run.apart = GLANCES * request.sample_steps, request.apart
-        # a block of rows; short rows of few columns in larger blocks
+        # a block of rows, fewer where each is wide
         self.rows = np.empty((ROOM if width < ROOM else 64, width))
         run.row, run.room = lib.pointer(self.rows), self.rows.shape[0]
 

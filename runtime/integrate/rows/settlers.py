@@ -74,7 +74,7 @@ class Settlers:
     def _values_do(self) -> bool:
         """Whether no row shows a rate that hidden rows alone tell."""
         system, request = self.system, self._request
-        # other rows are shown than those of values
+        # not asked for, or rows that rates decide, or too large
         if not request.valued or request.events or request.least_norm or self._point is None:
             return False
         # condensed, or with rates
