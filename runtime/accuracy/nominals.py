@@ -47,7 +47,6 @@ def nominals_of_unknowns(system: System, point: tuple[float, Floats, Floats], pe
     # each unknown has a row that determines it: of f = p/m that is f
     row_of = _pair(system, entry)
     nominal, paired = peaks.copy(), row_of >= 0
-    # entries of that row which read the other unknowns
     own = rows == row_of[columns]  # the entry at which an unknown meets its row
     pivot = np.zeros(system.unknowns)
     # the entry by which the row is solved for its unknown

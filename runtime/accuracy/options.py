@@ -107,7 +107,7 @@ def choose_index(wanted: str, facts: Structure, method: str = "auto") -> tuple[s
     # higher indices have no form here
     if written is not None and written > HIGHEST:
         raise NoSuchForm(above_highest(written))
-    # rosenbrock solves each step's linear systems of index 1 at most
+    # rosenbrock serves index 1 at most
     if method in OF_INDEX_ONE:
         if wanted not in ("auto", "1") and (written is None or written > 1):
             raise NoSuchForm(f"method {method} integrates equations of index 1, and index {wanted} was asked for")

@@ -88,7 +88,6 @@ def distance_of_runs(coarse: Sampled, fine: Sampled) -> Floats:
     # rates that are no numbers give no time tolerance
     late = np.minimum(np.fmax(np.fmax(late, fine.late), 0.0), LARGEST)  # no number: no time tolerance
     over = np.fmax(_outside(values, fine.values, late), _outside(fine.values, values, late))
-    # 0 times a value that is no number is none: it remains one
     over = np.fmax(over, 0.0 * fine.values * values)
     return over if fine.between is None else np.fmax(np.minimum(over, fine.between), over - fine.jump)
 
@@ -203,7 +202,7 @@ def passed_over(coarse: Sampled, fine: Sampled, target: Floats, credit: float) -
     # length of the step over what relaxes, and the bound by the dense output
     longer, most = fine.passed[at].T
     before = coarse.passed
-    # how far the coarser run's step was
+    # the length of the coarser run's step over it
     beside = before[at, 0] if before is not None and len(before) == len(at) else np.zeros(longer.size)
     with np.errstate(all="ignore"):  # steps of one length, of a run that does not pass over it: 0, infinite
         longer = longer / np.fmin(np.abs(1.0 - longer / beside), 1.0)

@@ -101,7 +101,7 @@ class Runs:
         self.patience: int | None = patience
         self.patience_with_draft: int | None = None
         self.opening = 0.0
-        # another form has other unknowns: the ceilings of its steps are unknown
+        # another form has other unknowns: what these stayed below is not known
         if before.system is not way.system:
             self.ceiling = None
         # the start as seen by another form is found anew

@@ -49,8 +49,8 @@ class Forms:
         """Elimination order of the stepped form's matrices [kept], found once."""
         stepped, whole = self.stepped, self.stepped.whole
 
-        # rows already stand in the order of their unknowns
         def make_order() -> Order:
+            # rows stand in the order of their unknowns already
             if stepped.paired:
                 return Order(paired_order(stepped.pattern), paired=True)
             order = any_order(stepped.pattern, leaving=bool(whole.form.scales))

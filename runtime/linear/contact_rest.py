@@ -88,7 +88,6 @@ class ContactRest:
             return None
         assert self._last is not None
         kept, state = self._last, self.contacts.state()
-        # a friction that slips at its bound while nothing moves sticks there
         if not all(self.contacts.active[k] for k in self._frictions):  # at its bound, and at rest: it sticks
             loaded = self._load_frictions(kept.state.y, kept.state.yd)
             self._stick()

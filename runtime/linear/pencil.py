@@ -276,7 +276,7 @@ def _parted_widely(matrices: tuple[Floats, ...], chosen: Choice) -> tuple[precis
     c, cd = (part * column for part in (c, cd))
     n, states = matrices[0].shape[0], chosen.size
     if (powers := _powers(matrices)) is None:
-        # powers hide how many motions there are
+        # a singular pencil
         return None
     m, nu, power = powers
     # any directions reach all motions, but for chance

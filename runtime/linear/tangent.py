@@ -202,9 +202,9 @@ def reduce(given: Given) -> Reduced:
     g = rows.jacobian[rows.holds]
     tangent, moves = _tangent(g, factors(g)[1])
     candidates = candidates_of(system, given.state, n)
-    # which unknowns serve as states
     part = tangent[candidates]
     rank = rank_of(part)
+    # which unknowns serve as states
     chosen = chosen_states(system, tangent, moves, candidates, loose)
     rates = _rates(starter, system, chosen)
     _refuse_undetermined(system, tangent, part, chosen, rates, rank)
@@ -221,8 +221,8 @@ def reduce(given: Given) -> Reduced:
     values, others = (np.linalg.eigvals(part) for part in (small.a, make(_variations(again, right, chosen, moves)).a))
     # double precision holds all modes but zeros
     if precise.steady(values[values != 0.0], others[others != 0.0]):
-        # else many digits, where states are few
         return small
+    # else many digits, where states are few
     if (
         small.names
         and (found := _reduce_precisely(len(small.names), make, (g, again, right, chosen, moves))) is not None

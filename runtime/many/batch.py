@@ -167,7 +167,7 @@ class Batch:
             max_wall=None,
         )
         made = Integration(self.system, self.start, request)
-        # stiffness is counted, not waited for
+        # dopri gives up after so many steps that stability holds
         if self.way.method == "dopri":
             made.method.contents.patience = request.stiff_steps
         return made
@@ -187,7 +187,6 @@ class Batch:
 
     @staticmethod
     def _settle(settler: Settler) -> list[tuple[int, int]]:
-        # the stepper, the run, the settlers
         core = settler.core.contents
         moves = core.unknowns + core.rates
         return [(c.addressof(core), c.sizeof(lib.Settle)), (core.scale, 8 * moves)]
@@ -196,6 +195,7 @@ class Batch:
         """Pass k of the core."""
         made, system = self.passes[k], self.system
         core = made.method.contents
+        # the stepper, the run, the settlers
         states = [(c.addressof(core), c.sizeof(core)), (c.addressof(made.driver.run), c.sizeof(lib.Run))]
         settlers = [made.settler, *([made.projection] if made.projection is not None else [])]
         zero = [lib.core.sd_linear_pivoted(made.linear)]
@@ -243,7 +243,7 @@ class Batch:
     def _begin(self) -> None:
         """The start of every run."""
         many, system, made = self.core, self.system, self.passes[1]
-        # unknowns that the text gives for each run
+        # the nominal start
         n = system.form.written
         y, yd = (np.ascontiguousarray(item[:n]) for item in (self.start.y, self.start.yd))
         found = anchors(made.settler, system, self.start.t, (y, yd), made.sizes.magnitude)
@@ -265,7 +265,7 @@ class Batch:
         settled.failure.check()
         if failed:
             raise NotApplicableError("the nominal start does not settle")
-        # entries there: those that are zero for good are left out of the pivots
+        # slopes at the nominal start
         jy, jyd = settled.jacobian(self.start.t, a[:n], b[:n])
         core.hold, core.ready = HELD, 0
         many.smallest = settler.linear.contents.smallest
@@ -290,7 +290,6 @@ class Batch:
     def _rates(settler: Settler, n: int) -> Floats:
         """Magnitudes of the rates [n]; 0 of those that occur nowhere."""
         found = np.zeros(n)
-        # M decides how least changes weigh
         found[settler.rates] = settler.scale[n:]
         return found
 
@@ -361,13 +360,13 @@ class Batch:
             few=estimate.SHORT,
             runs=control.RUNS,
             instants=MOST,
-            # room for the rows of three runs: draft, run, and a finer one
         )
         many.few_steps, many.many_steps = FEW_STEPS, law.most
         many.tolerance[0], many.tolerance[1] = draft, fine
         many.max_steps = min(options.max_steps or 2**62, 2**62)
         many.energy = allowed_share(options)
         many.thin, many.thins = self._keep_address(np.append(self._thin, np.int32(-1))), self._thin.size
+        # room for the rows of three runs: draft, run, and a finer one
         room = max(2 * MOST + 4, 0 if runs.instants.common is None else runs.instants.common.size + 4)
         for k in range(3):
             many.sample[k] = lib.RunSamples(

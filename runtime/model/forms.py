@@ -299,9 +299,9 @@ def plan(description: Description, name: str) -> Form:
     nu = at.copy()
     tables: dict[str, Ints] = {}
     groups: list[tuple[str, int, int]] = []
-    # phi', where the stabilised form projects with nu
     calls: list[Planned] = []
     scales: list[Planned] = []
+    # phi' beside phi, with multipliers nu
     stabilised = name == "2" and "phi" in description.blocks
     normal = "phi_normal" if "phi_normal" in description.blocks else "phi_reaction"
     # "2/3,5": families whose constraints stay underived

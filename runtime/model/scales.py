@@ -280,7 +280,7 @@ def magnitudes(
     motion = (None, None, None, None) if far is None else (*map(lib.pointer, far[:3]), far[3])
     answers = lib.pointer(found), lib.pointer(tau)
     tables = sizing(system)
-    # the room counts
+    # of a large system what was found on the way is let go
     if system.unknowns > LARGE:
         system.spare()
     core = c.byref(tables.core), c.byref(system.core)

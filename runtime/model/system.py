@@ -354,7 +354,7 @@ class System(Facts):
 
     def _powers(self) -> lib.Call | None:
         call = self._observer("audit")
-        # rows of energies: the first two and the first of each ledger
+        # without rows of energies: the first two, and the first of each ledger
         if call is not None:
             to, number = self.observed_rows("audit")
             read = np.ones(number, dtype=bool)
