@@ -34,17 +34,21 @@ def arrival(
     Raises NoSuchForm, WrongOption, SolverFailure.
     """
     written, start, facts = without_redundant(written, start, facts, options)
+    # no time passes: the start itself
     if options.t_end <= start.t:
         return written, start
     begin = written.description.p.copy(), written.description.switches.active.copy()  # events write there
     system, index, _ = form_system(written, start, facts, options)
     way = Way(choose_method(options), system, index, "")
+    # without accuracy no method is left for its sake
     controlled = replace(options, rtol=None, atol=None)
     ways = (way,) if options.method != "auto" else alternatives(way, written, start, controlled)
+    # the next method takes over where one fails
     for k, way in enumerate(ways):
         try:
             return written, _run_to_end(way, start, options, begin, last=k + 1 == len(ways))
         except SolverFailure as failure:
+            # the last one, or a limit that no method lifts
             if k + 1 == len(ways) or failure.cause in ("max_wall", "memory"):
                 raise
     raise AssertionError
@@ -76,6 +80,7 @@ def _run_to_end(
     run.run(_nothing, spent=False)
     n = way.system.form.written
     y, yd = run.method.point()
+    # onto all rows once more
     y, yd, settled = run.settler.settle(options.t_end, y[:n], yd[:n])
     if not settled:
         raise SolverFailure("newton", options.t_end, 0.0)

@@ -135,16 +135,20 @@ def cancelling_quantities(
     error = max(estimate or 0.0, ROUND_OFF)
     for name, terms in nominal.items():
         own = seen.get(name, 0.0)
+        # terms that cancel, and are not round-off alone
         if terms * 4.0 * EPS < own < CANCELS * terms and terms * error > (asked or MOST) * own:
             yield Cancelled(name, terms * error, terms)
+        # riding on an offset: moves less than its size by far
         elif NOISE * error * terms < (moves := ranges.get(name, 0.0)) < OFFSET * own:
             yield Cancelled(name, own * error, own, moves)
 
 
 def allowed_share(options: Options) -> float:
     """The part of what went through a ledger that its balance may be."""
+    # by the tolerance of the solver
     if own_tolerances(options):
         return max(min(MOST, TIMES * float(np.sqrt(options.rtol if options.rtol is not None else 1e-6))), LEAST)
+    # by the accuracy asked for
     asked = [a for a in (options.accuracy, *(wanted for _, wanted in options.accuracy_on)) if a is not None]
     return max(TIMES * max(asked, default=0.0), LEAST)
 
@@ -173,15 +177,19 @@ def judge(
         Shortfall("accuracy", e.error, e.asked, e.quantity, e.time, undefined=e.undefined, blurred=e.blurred)
         for e in misses
     ]
+    # one run of fixed steps is not judged
     if method == "euler":
         return Judgement((), tuple(found), conserved, turned_over(balances))
     judged = ["accuracy"] if accurate else []
     part = allowed_share(options)
+    # energies, then invariants
     for kind, what in (("energy", "energy"), ("invariant", "invariants")):
         own = [(k, b) for k, b in enumerate(balances) if b.kind == kind]
         judged += [what] if own else []
         for k, b in own:
+            # what went through the ledger sets its limit
             limit = part * b.turnover
+            # round-off may leave more open than that
             if limit < b.value and left_open is not None:
                 limit = max(limit, float(left_open()[k]))
             if not b.value <= limit:

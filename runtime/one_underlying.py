@@ -20,9 +20,11 @@ def refuse_undetermined(written: System, system: System, start: ConsistentState)
     """NoSuchForm where rates do not follow at the start; system: the underlying form of `written`."""
     missing = underlying_form(system, start)[1]
     flat = without_slope(written, start.t, *start.for_form(written)) if missing else ()
+    # a law without slope: a turbulent valve at rest
     if flat:
         text = f"{no_slope(flat)}, and there is no underlying equation: {WITH_A_SLOPE}, or {REMEDY}"
         raise NoSuchForm(text, flat)
+    # rates that nothing determines, by the names of their coordinates
     if missing:
         still = list(dict.fromkeys(name.rstrip("'") for name in missing if name.endswith("'")))[:3]
         remedy = f"inertia on {', '.join(still)}, constraints that hold it, or " if still else ""
@@ -41,8 +43,10 @@ def refuse_contacts(events: Plan | None) -> None:
 
 def refuse_sliding(system: System, events: Plan | None, failure: SolverFailure) -> None:
     """NoSuchForm of what stopped because laws slide: no row of the underlying equation determines their sense."""
+    # other failures are not of sliding laws
     if failure.cause != "newton" or not events:
         return
+    # laws that slide at the end
     sliding = [k.name for k in events.kinks if system.description.p[k.branch] == SLIDES]
     if sliding:
         rows = () if failure.row is None else (failure.row,)

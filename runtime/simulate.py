@@ -67,6 +67,7 @@ class Outcome:
     @property
     def traced(self) -> Trace:
         """The trace, read from its file or as it is held."""
+        # in memory
         if self.held is not None:
             return self.held
         assert self.trace is not None
@@ -82,8 +83,10 @@ def without_redundant(
     written: System, start: ConsistentState, facts: Structure, options: Options
 ) -> tuple[System, ConsistentState, Structure]:
     """The model as written without the redundant constraints that the options leave out."""
+    # words of the option
     if options.redundancy not in ("error", "drop", "minimum_norm"):
         raise WrongOption(f"redundancy {options.redundancy}: error, drop or minimum_norm")
+    # dependent constraints: left out, or followed as the motion turns them
     if facts.left_out and options.redundancy != "error":
         alike = options.redundancy == "minimum_norm" and not options.events
         followed = following(written, start, len(facts.left_out)) if alike else None
@@ -99,6 +102,7 @@ def form_system(
     """The system in the index form of the options, its index, warnings.  Raises NoSuchForm, ValueError."""
     form, index, warnings = choose_index(options.index, facts, options.method)
     system = written if form == "3" else written.another(form)
+    # index 0 must determine all rates
     if form == "0":
         refuse_undetermined(written, system, start)
     return system, index, warnings
@@ -133,6 +137,7 @@ def simulate(
     facts = facts or structure(written, start)
     written, start, facts = without_redundant(written, start, facts, options)
     system, index, warnings = form_system(written, start, facts, options)
+    # contacts have no underlying equation
     if system.form.name == "0":
         refuse_contacts(options.events)
     way = Way(method, system, index, form_name(system, facts))
@@ -147,6 +152,7 @@ def _runs(runs: Runs, others: tuple[Way, ...], written: System, facts: Structure
     options, start = runs.options, runs.start
     runs.derive(determined_rates(written, start))
 
+    # an outcome of what is there now
     def outcome(
         final: bool, reached: float, achieved: Achieved | None, failure: SolverFailure | None, **more: Any
     ) -> Outcome:
@@ -171,27 +177,34 @@ def _runs(runs: Runs, others: tuple[Way, ...], written: System, facts: Structure
         )
 
     achieved: Achieved | None = None
+    # runs until one is good enough
     try:
         achieved = run_controlled(runs, options, others)
     except SolverFailure as failure:
+        # a failure keeps the trace so far
         close(runs, None, None)
         if runs.system.form.name == "0":
             refuse_sliding(runs.system, options.events, failure)
+        # how far the trace goes
         reached = failure.time if runs.done is None else options.t_end
         failure.partial = outcome(False, reached, None, failure)
         raise
+    # an interrupt keeps it too
     except BaseException:
         close(runs, None, None)
         raise
     assert runs.done is not None
+    # the quantity that misses most, or one that is no number
     misses = worst_miss(runs, options, achieved) or not_met_undefined(runs.done[2].first_undefined())
     judgement = judge(options, runs.method, runs.done[0].balances, achieved is not None, misses, runs.open_balances)
     close(runs, achieved, judgement)
     finished, _, writer = runs.done
+    # rows that were not settled are said
     if finished.unsettled and not options.events:
         some = "1 row does" if finished.unsettled == 1 else f"{finished.unsettled} rows do"
         warnings = (*warnings, f"{some} not meet the equations: what stands there is the integrator's own")
     warnings += tuple(_floating(finished.open, written.description))
+    # terms that cancel, offsets
     estimate = achieved.error_estimate if achieved is not None else None
     ranges = {name: moves for name, moves in writer.ranges().items() if name not in options.to_range}
     terms = runs.quantities.terms(finished.largest)
@@ -205,6 +218,7 @@ def _runs(runs: Runs, others: tuple[Way, ...], written: System, facts: Structure
 def _floating(open_: Mapping[int, tuple[str, ...]], description: Description) -> Iterator[str]:
     """What is said of traced quantities that floated between contacts."""
     traced = {column.name: open_[column.place] for column in columns_of(description) if column.place in open_}
+    # what floats between the same contacts in one sentence
     for between in dict.fromkeys(traced.values()):
         names = ", ".join(name for name, of in traced.items() if of == between)
         choice = "what is traced then is one of many values that fit (a small resistance in series, or a large one to"
@@ -214,6 +228,7 @@ def _floating(open_: Mapping[int, tuple[str, ...]], description: Description) ->
 
 def _extrema(runs: Runs) -> dict[str, tuple[float, float]]:
     """Within the steps of a run, by traced name; nothing where they were not asked for."""
+    # not asked for
     if runs.done is None or runs.done[0].extrema is None:
         return {}
     least, most = runs.done[0].extrema
@@ -222,6 +237,7 @@ def _extrema(runs: Runs) -> dict[str, tuple[float, float]]:
 
 def close(runs: Runs, achieved: Achieved | None, judgement: Judgement | None) -> None:
     """Last attributes of the finished run that stands at the path; judgement None: it did not end as asked."""
+    # nothing to close
     if runs.done is None or runs.done[2].closed:
         return
     finished, _, writer = runs.done

@@ -302,7 +302,7 @@ def _share(asked: Floats, sizes: Floats) -> Floats:
 
 def _values(rows: Floats, finished: Finished, quantities: Quantities) -> Floats:
     """The compared quantities [k, quantities] at rows."""
-    # past the end of validity the values mean nothing
+    # an unknown went far beyond its magnitude: no value of the run counts
     if finished.beyond > BEYOND:
         rows = np.full_like(rows, np.nan)
     return rows[:, quantities.row]

@@ -12,6 +12,7 @@ def components(row: Places, column: Places, unknowns: int) -> Ints:
     """
     label = np.arange(unknowns, dtype=np.int32)
     least = np.full(int(row.max(initial=-1)) + 1, unknowns, dtype=np.int32)
+    # each pass takes the least label along rows, then that of the component it names
     while True:
         before = label.copy()
         np.minimum.at(least, row, label[column])

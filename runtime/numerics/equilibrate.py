@@ -28,11 +28,13 @@ def factors(*matrices: Floats) -> tuple[Floats, Floats]:
     """The factors of the rows [m] and of the columns [n]; 1 where a line is empty."""
     shape = matrices[0].shape
     row, column = np.ones(shape[0]), np.ones(shape[1])
+    # small matrices in the core, by the same sweeps
     if max(shape) <= SMALL and len(matrices) <= 2:
         kept = [np.ascontiguousarray(matrix, dtype=np.float64) for matrix in matrices]
         pair = (*map(lib.pointer, kept), None)[:2]
         lib.core.sd_factors(*shape, *pair, lib.pointer(row), lib.pointer(column))
         return row, column
+    # of several matrices the largest magnitude of each place
     size = np.max([np.abs(matrix) for matrix in matrices], axis=0)
     for _ in range(SWEEPS):
         by_row = _root(size.max(axis=1, initial=0.0))
@@ -46,7 +48,7 @@ def factors(*matrices: Floats) -> tuple[Floats, Floats]:
 def sparse_factors(
     rows: NDArray[np.integer], columns: NDArray[np.integer], size: Floats, shape: tuple[int, int]
 ) -> tuple[Floats, Floats]:
-    """The same of a matrix by its entries: magnitudes `size` at (rows, columns)."""
+    """The factors of the rows and of the columns of a matrix by its entries: magnitudes `size` at (rows, columns)."""
     row, column = np.ones(shape[0]), np.ones(shape[1])
     places = (np.ascontiguousarray(rows, dtype=np.int32), np.ascontiguousarray(columns, dtype=np.int32))
     arrays = (lib.pointer(item) for item in (*places, size, row, column))

@@ -60,20 +60,25 @@ def least_norm(
     """
     i, j, v = entries
     del entries
+    # no numbers: no solution
     if not (np.isfinite(v).all() and np.isfinite(aim).all()):
         raise NotFiniteError
     v = v if spent else v.copy()
+    # rows of size one, so that none passes for redundant by its unit
     back = _to_size_one(i, v, shape[0])
     aim = np.divide(aim, back, out=aim if spent else None)
     small = MET * largest_product(aim, back)
+    # a large matrix by columns, where its rows determine all unknowns
     columns = None if max(shape) <= SINGULAR_VALUES else by_columns(shape, (i, j, v), fewer=idle is not None)
     if columns is not None:
         matrix = columns
         del i, j, v
+        # rows that determine the solution: no least one to look for
         only = solve_columns(matrix, aim, lambda u: largest_product(matrix.residual(u, aim), back) <= small, idle)
         if only is not None:
             return only
         i, j, v = columns.entries()
+    # ways in order of cost, until one meets the rows
     tried: list[tuple[float, Floats]] = []
     for way in (_AGAIN if again else _DENSE) if max(shape) <= SINGULAR_VALUES else _SPARSE:
         found = way(shape, (i, j, v), aim)
@@ -81,6 +86,7 @@ def least_norm(
         if not missed > small:
             return found
         tried.append((missed, found))
+    # none does: the least miss, if it is clearly less than that of the first way
     least = min(tried, key=lambda item: item[0])
     return least[1] if least[0] < FAR * tried[0][0] else tried[0][1]
 
@@ -90,11 +96,13 @@ def least_measured(entries: tuple[Any, Any, Floats], aim: Floats, scale: Floats)
     is zero.  A scale that is no number: in what one unit of it does at most.
     """
     take, x = entries[2] != 0.0, np.zeros(scale.size)
+    # no entries: nothing moves
     if not take.any():
         return x
     (rows, i), (columns, j) = (np.unique(item[take], return_inverse=True) for item in entries[:2])
     v, most = entries[2][take], np.zeros(columns.size)
     np.maximum.at(most, j, np.abs(v))
+    # without a scale: one unit of effect
     unit = np.where(np.isnan(scale[columns]), 1.0 / most, scale[columns])
     x[columns] = unit * least_norm((rows.size, columns.size), (i, j, v * unit[j]), aim[rows], again=True)
     return x
@@ -114,15 +122,19 @@ def in_order(shape: tuple[int, int], entries: tuple[Any, Any, Floats], aim: Floa
     """
     i, j, v = entries
     a = _full(shape, i, j, v)
+    # as in `least_norm`
     if not (np.isfinite(a).all() and np.isfinite(aim).all()):
         raise NotFiniteError
+    # equilibrated; each level takes what it can, the next ones the rest
     row, column = factors(a)
     a, aim, found = row[:, None] * a, row * aim, np.zeros(shape[1])
     later = np.ones(shape[1], dtype=bool)
     for level in filter(np.any, levels):
+        # directions of the rows that no later level can meet
         later = later & ~level
         left, sigma, _ = singular_decomposition(a[:, later] * column[later])
         only = left[:, count(sigma) :].T  # what rows say of the level whatever comes later
+        # what is round-off of these directions says nothing
         said, largest = only @ a[:, level], np.abs(a[:, level]).max(axis=0, initial=0.0)
         noise = NOTHING / min(sigma[: count(sigma)], default=1.0)  # of `only`, by the least that counts
         said[np.abs(said) <= noise * largest] = 0.0
@@ -130,6 +142,7 @@ def in_order(shape: tuple[int, int], entries: tuple[Any, Any, Floats], aim: Floa
         k = int((sigma > RANK * largest.max(initial=0.0)).sum())  # nothing may be left of a level
         found[level] = right[:k].T @ ((left[:, :k].T @ (only @ aim)) / sigma[:k])
         aim = aim - a[:, level] @ found[level]
+    # at last all others, by entries that count
     size = np.abs(a * column)
     i, j = np.nonzero((size > NOTHING * size.max(axis=1, keepdims=True, initial=0.0))[:, later])
     found[later] = least_norm((shape[0], int(later.sum())), (i, j, a[:, later][i, j]), aim)
@@ -152,7 +165,7 @@ def _singular_values(shape: tuple[int, int], entries: tuple[Any, Any, Floats], a
 
 
 def _of_known(shape: tuple[int, int], entries: tuple[Any, Any, Floats], aim: Floats) -> Floats:
-    """The same by the decomposition that is remembered, and once more for what that misses."""
+    """The u of least norm by the decomposition that is remembered, and once more for what that misses."""
     a = _full(shape, *entries)
     parts = singular_decomposition(a)
     found = least_by(parts, aim, RANK)
@@ -160,10 +173,11 @@ def _of_known(shape: tuple[int, int], entries: tuple[Any, Any, Floats], aim: Flo
 
 
 def _of_one_size(shape: tuple[int, int], entries: tuple[Any, Any, Floats], aim: Floats) -> Floats:
-    """The same where columns of one size say which rows are redundant: a change that the metric takes for nothing may
-    be the only one that meets a row.
+    """The u of least norm where columns of one size say which rows are redundant: a change that the metric takes for
+    nothing may be the only one that meets a row.
     """
     i, j, v = entries
+    # columns of one size decide ranks
     size = sparse_factors(i, j, np.abs(v), shape)[1]
     parts = singular_decomposition(_full(shape, i, j, v * size[j]))
     found, free = least_by(parts, aim, RANK), parts[2][count(parts[1], RANK) :].T
@@ -179,14 +193,17 @@ def _saddle_point(shape: tuple[int, int], entries: tuple[Any, Any, Floats], aim:
     """The u of least norm with A u = aim from [weight I, A^T; A, -eps]."""
     rows, unknowns = shape
     i, j, v = entries
+    # unknowns, then multipliers
     here = np.arange(unknowns), unknowns + np.arange(rows)
     places = (
         np.concatenate([here[0], j, unknowns + i, here[1]]),
         np.concatenate([here[0], unknowns + i, j, here[1]]),
     )
+    # weight on the diagonal, A and its transpose, a faint -eps
     values = np.concatenate([np.full(unknowns, weight), v, v, np.full(rows, -EPS)])
     matrix = Symmetric(unknowns + rows, places, values, definite=True)
     found = np.zeros(unknowns + rows)
+    # each pass takes off what eps left behind
     for _ in range(_PROXIMAL):
         # eps acts on the change of the multipliers only, so that it leaves no trace in the solution
         right = np.concatenate([np.zeros(unknowns), aim - EPS * found[unknowns:]])

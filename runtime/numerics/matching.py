@@ -13,9 +13,11 @@ def match_rows(pattern: Pattern, given: Ints | None = None) -> Ints:
 
     given [unknowns]: such rows, which stay but where one has to make room.
     """
+    # rows that are given are begun with
     found = np.zeros(pattern.unknowns, dtype=np.int32) if given is None else given.astype(np.int32)
     looks = np.zeros(1, dtype=np.int64)
     places = lib.pointer(pattern.column), lib.pointer(pattern.row), given is not None
+    # no room for the search
     if lib.core.sd_match(pattern.rows, pattern.unknowns, *places, lib.pointer(found), lib.pointer(looks)) < 0:
         raise MemoryError
     return found

@@ -64,6 +64,7 @@ class Order:
     @cached_property
     def position(self) -> Ints | None:
         """Of each column in the order [unknowns], where factors that pivot as it says have none of their own."""
+        # own rows, or any pivots: no fixed position
         if not self.paired or self.own is not None or self.columns is None:
             return None
         found = np.empty_like(self.columns)
@@ -80,7 +81,7 @@ class Order:
         return self._make_order(lib.core.sd_linear_ordered, pattern)
 
     def complex_linear(self, pattern: Pattern) -> int:
-        """The same of complex ones: its address."""
+        """Factors of complex matrices of a pattern in this order: their address."""
         return int(self._make_order(lib.core.sd_linear_z_ordered, pattern))
 
     def _make_order(self, make: Callable[..., Any], pattern: Pattern) -> Any:
@@ -96,7 +97,7 @@ def order_of(system: System) -> Order:
 
 
 def net_order_of(system: System) -> Order:
-    """The same with rows of their own where that fills less, of a large net."""
+    """The order of a system's matrices, with rows of their own where that fills less, of a large net."""
     return system.once(("order", "net"), lambda: with_pairs(system.pattern, order_of(system), lambda: own_rows(system)))
 
 
@@ -107,20 +108,25 @@ def with_pairs(pattern: Pattern, order: Order, given: Callable[[], Ints | None] 
     unknowns that are known [unknowns], -1: any; asked for where they matter.
     """
     n = pattern.unknowns
+    # small, or hardly any fill: any pivots serve
     if n <= SMALL or order.filled <= SHORT * n:
         return order
+    # a row for each unknown, those that are known first
     own = match_rows(pattern, given())
     if (own < 0).any():
         return order
     of = np.empty(n, dtype=np.int32)
+    # rows permuted so that these stand on the diagonal
     of[own] = np.arange(n, dtype=np.int32)
     permuted, _ = compress(n, n, [Places(of[pattern.row], pattern.columns_of())])
     columns, filled = _large(neighbours(permuted))
+    # taken only where it fills clearly less
     return order if filled > GAIN * order.filled else Order(columns, filled, True, own, order.columns, order.filled)
 
 
 def any_order(pattern: Pattern, *, leaving: bool = False) -> Order:
     """`column_order` with what it may fill."""
+    # exact degrees for small matrices
     if pattern.unknowns <= SMALL:
         return Order(column_order(pattern, leaving=leaving))
     return Order(*_large(pattern))
@@ -131,23 +137,26 @@ def column_order(pattern: Pattern, *, leaving: bool = False) -> Ints | None:
 
     leaving: columns may be left without a pivot.
     """
+    # the dense LU needs no order
     if pattern.unknowns <= (LEAVING if leaving else DENSE):
         return None
     return least_degree(pattern) if pattern.unknowns <= SMALL else _large(pattern)[0]
 
 
 def paired_order(pattern: Pattern) -> Ints | None:
-    """The same where row k belongs to unknown k and pivots there: least degree of A + A^T (a grid of 100 x 100 fills
-    371000 places by it, 646000 by the order for any pivots).
+    """An elimination order [unknowns] where row k belongs to unknown k and pivots there: least degree of A + A^T (a
+    grid of 100 x 100 fills 371000 places by it, 646000 by the order for any pivots).
 
     A matrix with a row for each pair of neighbours has A + A^T for its square, and its column order is that one (Davis,
     Gilbert, Larimore & Ng, ACM Trans. Math. Softw. 30, 2004, SYMAMD).  Lines are eliminated from both ends at once: a
     step of bdf costs 0.85, one of radau 0.8 of what it does from one end.
     """
+    # as for any pivots
     if pattern.unknowns <= SMALL:
         return column_order(pattern)
     order, _ = _large(neighbours(pattern))
     places = lib.pointer(pattern.column), lib.pointer(pattern.row)
+    # no room in the core
     if lib.core.sd_both_ends(pattern.unknowns, *places, lib.pointer(order)) < 0:
         raise MemoryError
     return order
@@ -160,11 +169,13 @@ def symmetric_order(pattern: Pattern, *, faint: bool = False) -> Order:
 
 def neighbours(pattern: Pattern) -> Pattern:
     """A row for each two unknowns of which one stands in the row of the other, with both."""
+    # each edge once, whichever row it stands in
     row, column = pattern.row, pattern.columns_of()
     apart = row != column
     low, high = np.minimum(row, column)[apart], np.maximum(row, column)[apart]
     n = pattern.unknowns
     edges, _ = compress(n, n, [Places(low, high)])
+    # an edge is a row with two entries
     number = np.arange(edges.entries, dtype=np.int32)
     ends = [Places(number, edges.row), Places(number, edges.columns_of())]
     return compress(edges.entries, n, ends)[0]
@@ -173,6 +184,7 @@ def neighbours(pattern: Pattern) -> Pattern:
 def least_degree(pattern: Pattern) -> Ints:
     """The columns [unknowns], each that whose elimination can fill least; sets of columns are bits of integers."""
     n, columns = pattern.unknowns, pattern.columns_of()
+    # rows as bits of columns; which rows hold each column
     rows: dict[int, int] = {}
     holding: list[set[int]] = [set() for _ in range(n)]
     for row, column in zip(pattern.row.tolist(), columns.tolist(), strict=True):
@@ -187,6 +199,7 @@ def least_degree(pattern: Pattern) -> Ints:
 
     degrees = {c: degree(c) for c in range(n)}
     found = []
+    # the column of least degree, its rows merged into one
     while degrees:
         best = min(degrees, key=lambda c: (degrees[c], c))
         del degrees[best]
@@ -195,9 +208,11 @@ def least_degree(pattern: Pattern) -> Ints:
         for row in holding[best]:
             merged |= rows.pop(row)
         merged &= ~(1 << best)
+        # nothing is left of its rows
         if kept < 0 or not merged:
             continue
         rows[kept] = merged
+        # only neighbours change their degree
         gone, touched = holding[best] - {kept}, [c for c in degrees if merged >> c & 1]
         for c in touched:
             holding[c] -= gone
@@ -208,7 +223,7 @@ def least_degree(pattern: Pattern) -> Ints:
 
 
 def tall_order(pattern: Pattern) -> Ints:
-    """The same of a matrix that has more rows than columns, always sparse."""
+    """An elimination order [unknowns] of a matrix that has more rows than columns, always sparse."""
     return least_degree(pattern) if pattern.unknowns <= SMALL else _large(pattern)[0]
 
 
@@ -220,7 +235,9 @@ def least_fill(pattern: Pattern, ahead: Pattern | None = None) -> tuple[Ints, in
 
 
 def _large(pattern: Pattern, ahead: Pattern | None = None) -> tuple[Ints, int]:
-    """The same by approximate degrees, in the core (core/linear/order/order.h), and what it fills at most."""
+    """An elimination order [unknowns] by approximate degrees, in the core (core/linear/order/order.h), and what it
+    fills at most.
+    """
     found, filled = np.zeros(pattern.unknowns, dtype=np.int32), np.zeros(1, dtype=np.int64)
     answers = lib.pointer(found), lib.pointer(filled)
     places = pattern.column, pattern.row, *((None, None) if ahead is None else (ahead.column, ahead.row))

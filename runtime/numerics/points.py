@@ -37,6 +37,7 @@ def normal(*shape: int, behind: int = 0) -> NDArray[Any]:
     """Numbers [shape] as from the normal distribution (Box and Muller, 1958); behind: so many that come before them."""
     number = int(np.prod(shape))
     radius, angle = uniform(number, 0, behind), uniform(number, 1, behind)
+    # radius sqrt(-2 ln(1 - u)), angle 2 pi v
     np.log1p(np.negative(radius, out=radius), out=radius)
     radius *= -2.0
     np.sqrt(radius, out=radius)

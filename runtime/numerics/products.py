@@ -50,6 +50,7 @@ def pieces(size: int) -> Iterator[slice]:
 def linked_places(chosen: NDArray[np.bool_], of: Ints, at: Ints, size: int) -> NDArray[np.bool_]:
     """Places [size] among `at` [entries] of those entries whose places `of` [entries] are chosen."""
     found = np.zeros(size, dtype=bool)
+    # piece by piece: no array as long as the entries
     for k in range(0, of.size, PIECE):
         found[at[k : k + PIECE][chosen[of[k : k + PIECE]]]] = True
     return found

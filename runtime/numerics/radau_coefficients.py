@@ -58,6 +58,7 @@ def nodes(stages: int) -> list[Any]:
 def _matrix(c: list[Any]) -> Any:
     """A [s][s]: sum_j a_ij c_j^(k-1) = c_i^k / k."""
     s = len(c)
+    # c_i^k, and their integrals from 0
     powers = mp.matrix(s, s)
     integrals = mp.matrix(s, s)
     for i in range(s):
@@ -80,6 +81,7 @@ def _eigenvector(inverse: Any, value: Any) -> list[Any]:
     """Of A^-1 with its last component 1 [s]."""
     s = inverse.rows - 1
     matrix, right = mp.matrix(s, s), mp.matrix(s, 1)
+    # the last component is 1: the other s - 1 from the first rows
     for i in range(s):
         right[i] = -inverse[i, s]
         for j in range(s):
@@ -93,6 +95,7 @@ def _estimate(c: list[Any], b: list[Any], inverse: Any, gamma: Any) -> list[Any]
     s = len(c)
     powers = mp.matrix(s, s)
     wanted = mp.matrix(s, 1)
+    # exact for polynomials, the slope at the start counted with weight 1 / gamma
     for q in range(s):
         wanted[q] = mp.mpf(1) / (q + 1) - (1 / gamma if q == 0 else 0)
         for i in range(s):
@@ -104,6 +107,7 @@ def _estimate(c: list[Any], b: list[Any], inverse: Any, gamma: Any) -> list[Any]
 
 def _lift(c: list[Any]) -> list[Any]:
     """The integral of prod (x - c_i) / prod (-c_i): coefficients of x^1 ... x^(s+1)."""
+    # the product, factor by factor
     power = [mp.mpf(1)]
     for node in c:
         factor = [mp.mpf(1), -1 / node]  # 1 - x / c
@@ -131,10 +135,12 @@ def coefficients(stages: int) -> Coefficients:
         b = [a[stages - 1, j] for j in range(stages)]
         values = _eigenvalues(stages)
         right = mp.matrix(stages, stages)
+        # eigenvectors as columns; rows of the inverse are the left ones
         for k, value in enumerate(values):
             for i, item in enumerate(_eigenvector(inverse, value)):
                 right[i, k] = item
         left = mp.inverse(right)
+        # one real eigenvalue, pairs by their imaginary parts
         real = min(range(stages), key=lambda k: abs(mp.im(values[k])))
         pairs = sorted((k for k in range(stages) if mp.im(values[k]) > 1e-9), key=lambda k: mp.im(values[k]))
         gamma = mp.re(values[real])
@@ -171,6 +177,7 @@ def _fill_lines(items: list[str], indent: str) -> str:
     lines, line = [], indent + "{"
     for k, item in enumerate(items):
         part = item + (", " if k + 1 < len(items) else "}")
+        # too long for this line: on to the next
         if len(line) + len(part.rstrip()) > WIDTH:
             lines.append(line.rstrip())
             line = indent + " "

@@ -39,6 +39,7 @@ def singular_decomposition(matrix: Floats) -> tuple[Floats, Floats, Floats]:
     """U [m, m], singular values [min(m, n)] (falling), v^T [n, n] of a matrix [m, n]; read-only.  NotFiniteError."""
     if not np.isfinite(matrix).all():
         raise NotFiniteError
+    # large matrices are not remembered
     if max(matrix.shape) > REMEMBERED:
         return _decompose(matrix)
     return _recall(np.ascontiguousarray(matrix, dtype=np.float64).tobytes(), *matrix.shape)
@@ -46,7 +47,9 @@ def singular_decomposition(matrix: Floats) -> tuple[Floats, Floats, Floats]:
 
 @functools.lru_cache(maxsize=DECOMPOSITIONS)
 def _recall(data: bytes, m: int, n: int) -> tuple[Floats, Floats, Floats]:
-    """The same of the numbers of a matrix: those of a linear network come again with every set of its switches."""
+    """The decomposition of a matrix by its numbers: those of a linear network come again with every set of its
+    switches.
+    """
     u, sigma, vt = _decompose(np.frombuffer(data).reshape(m, n))
     return read_only(u), read_only(sigma), read_only(vt)
 
@@ -63,6 +66,7 @@ def _decompose(matrix: Floats) -> tuple[Floats, Floats, Floats]:
 
 def singular_values(matrix: Floats) -> Floats:
     """Those of a matrix [m, n], falling [min(m, n)]: half of the work where nothing else is asked.  NotFiniteError."""
+    # no numbers: no rank
     if not np.isfinite(matrix).all():
         raise NotFiniteError
     try:
@@ -79,6 +83,7 @@ def sure_complement(matrix: Floats, smallest: float) -> Floats | None:
     from scipy.linalg.lapack import dtrcon
 
     m, n = matrix.shape
+    # more rows than columns depend in any case
     if not 0 < m <= n or not np.isfinite(matrix).all():
         return None
     q, r = qr(matrix.T, check_finite=False)
@@ -87,10 +92,12 @@ def sure_complement(matrix: Floats, smallest: float) -> Floats | None:
 
 def sure_solver(matrix: Floats, smallest: float) -> Callable[[Floats], Floats] | None:
     """What solves by a matrix [n, n] that is regular beyond doubt, in this sense."""
+    # LU with an estimate of its condition
     from scipy.linalg.lapack import dgecon, dgetrf, dgetrs
 
     n = matrix.shape[0]
     lu, pivots, failed = dgetrf(matrix)
+    # singular, or too near to it to be sure
     if failed or not dgecon(lu, np.linalg.norm(matrix, 1))[0] > DOUBT * n * smallest:
         return None
     return lambda aim: np.asarray(dgetrs(lu, pivots, aim)[0])
@@ -105,10 +112,12 @@ def rank(matrix: Floats) -> int:
     """Rank of an equilibrated matrix.  NotFiniteError."""
     if not matrix.size:
         return 0
+    # large: by singular values; small ones in the core
     if max(matrix.shape) > SMALL:
         return count(singular_values(matrix))
     matrix = np.ascontiguousarray(matrix, dtype=np.float64)
     found = int(lib.core.sd_rank(*matrix.shape, lib.pointer(matrix), TOLERANCE))
+    # the core has met an entry that is no number
     if found < 0:
         raise NotFiniteError
     return found
@@ -125,6 +134,7 @@ def left_null_vectors(blocks: Floats) -> tuple[NDArray[np.intp], Floats]:
     that it maps to zero from the left.
     """
     u, sigma, _ = np.linalg.svd(blocks)
+    # rows of U behind the rank, and those beyond all singular values
     rest = np.ones((len(blocks), blocks.shape[1]), dtype=bool)
     rest[:, : sigma.shape[1]] = sigma <= TOLERANCE * sigma.max(axis=1, keepdims=True)
     matrix, place = np.nonzero(rest)
@@ -140,12 +150,13 @@ def least_squares(matrix: Floats, aim: Floats, smallest: float = TOLERANCE) -> F
         raise NotFiniteError
     try:
         return np.asarray(np.linalg.lstsq(matrix, aim, rcond=smallest)[0], dtype=np.float64)
+    # LAPACK's fast algorithm gives up on a few finite matrices
     except np.linalg.LinAlgError:
         return least_by(singular_decomposition(matrix), aim, smallest)
 
 
 def least_by(parts: tuple[Floats, Floats, Floats], aim: Floats, smallest: float = TOLERANCE) -> Floats:
-    """The same by a decomposition, as `singular_decomposition` answers it."""
+    """The least-squares solution by a decomposition, as `singular_decomposition` answers it."""
     u, sigma, vt = parts
     k = count(sigma, smallest)
     return np.asarray(vt[:k].T @ ((u[:, :k].T @ aim) / sigma[:k]))

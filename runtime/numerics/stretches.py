@@ -21,6 +21,7 @@ class Stretches(Generic[Number]):
     def __init__(self, whole: NDArray[Number]) -> None:
         bits = whole.view(f"i{whole.itemsize}")  # zeros of both signs, and what is no number
         begin = np.flatnonzero(np.concatenate([[True], bits[1:] != bits[:-1]])[: whole.size])
+        # held by stretches where that is clearly shorter
         self._few = SHORTER * 2 * begin.size <= whole.size
         self._values: NDArray[Number] = whole[begin] if self._few else whole
         self._lengths = np.diff(begin, append=whole.size) if self._few else begin[:0].copy()

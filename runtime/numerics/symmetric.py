@@ -31,6 +31,7 @@ class Symmetric:
         self, number: int, places: tuple[NDArray[Any], NDArray[Any]], values: Floats, *, definite: bool = False
     ) -> None:
         rows, columns = (item.astype(np.int32) for item in places)
+        # entries of one place are added up
         self._pattern, (slot,) = compress(number, number, [Places(rows, columns)])
         self._values = np.bincount(slot, weights=values, minlength=self._pattern.entries).astype(np.float64)
         if not np.isfinite(self._values).all():

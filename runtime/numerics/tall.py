@@ -49,6 +49,7 @@ class Columns:
 
     def whole(self, found: Floats, *, rest: float = 0.0) -> Floats:
         """Of all unknowns, `rest` those of columns without entries."""
+        # every column has entries
         if self.used.all():
             return found
         whole = np.full(self.used.size, rest)
@@ -72,16 +73,19 @@ class Columns:
 def by_columns(shape: tuple[int, int], entries: Entries, *, fewer: bool) -> Columns | None:
     """fewer: rows may be fewer than the columns that are used, and empty ones make up for it; else there is none."""
     i, j, v = entries
+    # entries that are zero have no place
     if np.count_nonzero(v) < v.size:
         here = v != 0.0
         i, j, v = i[here], j[here], v[here]
     used = np.zeros(shape[1], dtype=bool)
     used[j] = True
     rows, unknowns = shape[0], int(used.sum())
+    # more unknowns than rows: empty rows make up for it, or there is no such matrix
     if unknowns > rows:
         if not fewer:
             return None
         rows = unknowns
+    # entries stand in order: they are taken as they are
     if _in_order(i, j):
         begin = np.empty(unknowns + 1, dtype=np.int32)
         begin[0], begin[-1] = 0, j.size
@@ -89,6 +93,7 @@ def by_columns(shape: tuple[int, int], entries: Entries, *, fewer: bool) -> Colu
         begin[1:-1] += 1
         row, values = np.ascontiguousarray(i, dtype=np.int32), np.ascontiguousarray(v, dtype=np.float64)
         return Columns(shape[0], used, Pattern(rows, unknowns, begin, row), values)
+    # else sorted and added up
     number = np.cumsum(used, dtype=np.int32) - 1
     pattern, (slot,) = compress(rows, unknowns, [Places(i, number[j])])
     values = np.bincount(slot, weights=v, minlength=pattern.entries).astype(np.float64, copy=False)
@@ -127,13 +132,16 @@ def solve_columns(
     met: Callable[[Floats], bool] = lambda _: True,
     idle: NDArray[np.bool_] | None = None,
 ) -> Floats | None:
-    """The same by columns."""
+    """The solution of a tall system by its columns; None where the rows leave it open, or `met` refuses it."""
+    # empty rows that were added ask for nothing
     more = columns.pattern.rows - columns.rows
     if more:
         aim = np.append(aim, np.zeros(more))
+    # by substitution first, then by factors
     for way in (_substitute, _factor if idle is None else _determine_open(idle)):
         found = np.zeros(columns.pattern.unknowns)
         failed = way(columns, aim, found)
+        # a solution that misses counts as none
         if failed == MEMORY:
             raise MemoryError
         whole = None if failed else columns.whole(found)
@@ -158,7 +166,7 @@ def _factor(
 
 
 def _determine_open(idle: NDArray[np.bool_]) -> Callable[[Columns, Floats, Floats], int]:
-    """The same with unknowns that may be left open."""
+    """A factorisation of columns with unknowns that may be left open."""
 
     def factor(columns: Columns, aim: Floats, found: Floats) -> int:
         own, along = idle[columns.used], _generic(found.size)
@@ -179,6 +187,7 @@ def left_open(shape: tuple[int, int], entries: Entries) -> Floats | None:
     """
     columns = by_columns(shape, entries, fewer=True)
     assert columns is not None
+    # a random direction: it shows whatever is open
     found = _generic(columns.pattern.unknowns)
     failed = _factor(columns, None, None, along=found)
     if failed == MEMORY:
@@ -186,6 +195,7 @@ def left_open(shape: tuple[int, int], entries: Entries) -> Floats | None:
     if failed:
         return None
     whole = columns.whole(found, rest=1.0)
+    # the largest entry has size one
     whole /= max(np.abs(whole).max(initial=0.0), 1e-300)
     return whole
 
@@ -197,6 +207,7 @@ def free_unknowns(shape: tuple[int, int], entries: Entries) -> NDArray[np.bool_]
         open_ = np.ones(shape[1], dtype=bool)
         open_[j] = False
         return open_
+    # equilibrated: no factor depends on units
     row, column = sparse_factors(i, j, np.abs(v), shape)
     with np.errstate(over="ignore", invalid="ignore"):
         scaled = v * row[i] * column[j]

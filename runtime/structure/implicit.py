@@ -24,19 +24,24 @@ def undetermined_implicits(system: System, state: ConsistentState, facts: Struct
     """Implicit unknowns that a null vector of the pencil moves at the state, and none where these are others; system:
     the form as written.
     """
+    # an index and nothing undetermined: nothing is open
     if facts.index is not None and not facts.undetermined:
         return ()
     implicit = np.flatnonzero(system.are("e"))
+    # with an index: those of no law are open by themselves
     if facts.index is not None:
         laws = {row.label for row in system.description.rows if row.block == "gamma"}
         found = (name for name in map(system.name, implicit.tolist()) if name in facts.undetermined)
         return tuple(name for name in found if f"{name.partition('[')[0].removesuffix('.e')}.law" not in laws)
+    # nothing implicit, or too large to ask
     if not implicit.size or system.unknowns > DENSE:
         return ()
     y, yd = state.for_form(system)
     clean, slopes = state.without_noise(y), system.jacobian(state.t, y, yd)
+    # those that a null vector moves at the state
     open_ = null_place(system, *slopes)[0]
     mine = [k for k in implicit.tolist() if system.name(k) in open_]
+    # beside it: a law that is flat at the state alone determines them
     beside = y.copy()
     beside[mine] += BESIDE * balanced_sizes(system, clean, system.jacobian(state.t, clean, yd)[0])[mine]
     left = null_place(system, *system.jacobian(state.t, beside, yd))[0] if mine else ()

@@ -23,11 +23,13 @@ def negative_inertia(system: System, state: ConsistentState) -> tuple[str, float
     if not flows.size:
         return None
     slopes = system.jacobian(state.t, *state.for_form(system))
+    # of a large model its diagonal alone
     if flows.size > DENSE:
         diagonal = own_inertia(system, *slopes)[flows]
         k = int(np.argmin(diagonal))
         return (system.name(int(flows[k])), float(diagonal[k])) if diagonal[k] < 0.0 else None
     m = inertia(system, *slopes)
+    # momenta that do not determine flows: not judged
     if not np.isfinite(m).all():
         return None
     diagonal = np.diag(m)
@@ -36,8 +38,10 @@ def negative_inertia(system: System, state: ConsistentState) -> tuple[str, float
     # scaled to a unit diagonal, so that grams and tons are judged alike
     scale = 1.0 / np.sqrt(np.where(np.abs(np.diag(m)) > 0.0, np.abs(np.diag(m)), 1.0))
     found, vectors = np.linalg.eigh(0.5 * (m + m.T) * scale[:, None] * scale[None, :])
+    # positive, or zero to round-off
     if found[0] >= -NEGATIVE * max(abs(found[-1]), NEGATIVE):
         return None
+    # in the unit of the flow that moves most
     k = int(np.argmax(np.abs(vectors[:, 0])))
     along = scale * vectors[:, 0]
     along /= along[k]

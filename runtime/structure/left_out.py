@@ -36,14 +36,17 @@ def null_space(system: System, t: float, y: Floats, yd: Floats, number: int) -> 
     """N [multipliers, number] of all constraints, whether they hold or not, orthonormal, near a consistent point
     [unknowns]; None where more depends.
     """
+    # reactions of all constraints: rows that depend have a left null space
     found = reactions(system, system.jacobian(t, y, yd)[0], every=True)
     rows, row = np.unique(found.row, return_inverse=True)
     matrix = np.zeros((found.multipliers.size, rows.size))
     np.add.at(matrix, (found.which, row), found.value)
+    # no numbers beside the point
     if not np.isfinite(matrix).all():
         return None
     left, sigma, _ = singular_decomposition(matrix)
     rank = len(matrix) - number
+    # a clear gap behind the rank, or the number is another
     sigma = np.append(sigma, np.zeros(len(matrix)))
     return left[:, rank:] if rank == 0 or sigma[rank] <= APART * sigma[rank - 1] else None
 
@@ -64,20 +67,25 @@ def following(system: System, state: ConsistentState, number: int) -> System | N
     """The system as written without `number` of its dependent constraints, which can be chosen anew (as `Switches`);
     None where one choice serves for good, they are too many to be followed, or it does not tell how they depend.
     """
+    # nothing depends, too many to follow, or constraints that hold at times
     multipliers = np.flatnonzero(system.are("kappa", "mu"))
     if not number or multipliers.size > MOST or system.description.switches.places:
         return None
+    # the null space here and beside the state
     y, yd = state.for_form(system)
     start, *beside = (null_space(system, state.t, point, yd, number) for point in (y, *nearby(system, state)))
     if start is None:
         return None
+    # the same everywhere: one choice serves
     known = [start, *(null for null in beside if null is not None)]
     if all(np.abs(null @ null.T - start @ start.T).max() < SOME for null in known):
         return None
+    # multipliers that take part in any dependence
     members = np.abs(np.hstack(known)).max(axis=1) > SOME
     at = multipliers[members]
     families = system.family_of[at]
     places = tuple((int(k), int(place - system.form.at[k])) for k, place in zip(families, at, strict=True))
+    # a description of its own: these constraints become switches
     fresh: dict[str, Any] = {"layouts": {}, "alive": WeakValueDictionary(), "room": [], "systems": None}
     description = replace(system.description, switches=Switches(places, redundant=True), **fresh)
     description.switches.set(~np.isin(np.flatnonzero(members), chosen(start)))

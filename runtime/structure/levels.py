@@ -30,9 +30,11 @@ def undifferentiated_families(system: System) -> tuple[int, ...] | None:
     """Row families of constraints that stand as they are, ascending; None where balances would have to be
     differentiated, or the model is too large.
     """
+    # of large models matching costs too much
     if system.unknowns > LARGE:
         return None
     rows = _Rows(system.another("settled"))
+    # differentiate what cannot be matched until all can
     while True:
         failed = rows.unmatched_equations()
         if not failed:
@@ -48,6 +50,7 @@ class _Rows:
         first = {(group, k): row for group, k, row in settled.form.groups}
         families = settled.description.rows
         own: list[tuple[Longs, Longs, int]] = []
+        # rows with two levels: as they are and differentiated
         for (group, k), row in first.items():
             here = row + np.arange(families[k].size, dtype=np.int64)
             if group in _ALWAYS:
@@ -67,10 +70,12 @@ class _Rows:
 
     def _entries_now(self) -> tuple[Longs, Longs]:
         """Equation and unknown of each entry: of each equation the unknowns whose highest derivative stands in it."""
+        # the rows of the present level of each equation
         row, column, in_y, in_rate = self._entries
         number = np.full(self._sizes[0], -1, dtype=np.int64)
         number[self.row[self.level, np.arange(self.level.size)]] = np.arange(self.level.size)
         mine = number[row] >= 0
+        # an equation stands for the highest derivatives in it
         rates = mine & in_rate & self._rated
         moved = np.zeros(self._sizes[1], dtype=bool)
         moved[column[rates]] = True
@@ -79,6 +84,7 @@ class _Rows:
 
     def unmatched_equations(self) -> set[int]:
         """Equations on the alternating paths of those for which no unknown is left."""
+        # equations to unknowns; what is left over, and what alternates with it
         equation, unknown = self._entries_now()
         order, unknowns = np.lexsort((unknown, equation)), self._sizes[1]
         first = np.searchsorted(equation[order], np.arange(self.level.size + 1))

@@ -31,8 +31,10 @@ def order_and_manifold(system: System, state: ConsistentState, idle: AbstractSet
     full = _rows(starter, state)
     if full is None:
         return None
+    # rows that hold at starts, without initial values
     full = full[starter.every & ~starter.groups("initial")]
     whole, kinds = _graded_rank(full), system.kinds
+    # states: contents, and flows that have rates
     _, jyd = system.jacobian(state.t, state.y, state.yd)
     moving = np.isin(kinds, ("q", "p", "s")) | ((kinds == "f") & system.differential(jyd))
     families = system.description.families
@@ -51,6 +53,7 @@ def freedom(system: System, state: ConsistentState) -> tuple[int, tuple[str, ...
     """How many more fixed values a state as found would take, and the names of the free unknowns among which (of models
     too large unknown: 0).
     """
+    # what the state leaves free, beyond what it fixes
     starter = Starter(system)
     tangent = _tangent(starter, state, starter.every, starter.free)
     if tangent is None:
@@ -68,6 +71,7 @@ def _tangent(starter: Starter, state: ConsistentState, rows: Mask, free: Mask) -
     full = _rows(starter, state)
     if full is None:
         return None
+    # null space in equilibrated rows
     null = null_space(*equilibrate(full[rows][:, free]))
     tangent = np.zeros((free.size, null.shape[1]))
     tangent[free] = null
@@ -97,18 +101,22 @@ def _graded_rank(matrix: Floats) -> int:
     of an entry is zero where it is small beside the terms that it came of.
     """
     left, size, found = matrix.copy(), np.abs(matrix), 0
+    # one pivot after the other, without a fixed order
     while left.size:
         left[np.abs(left) <= TOLERANCE * size] = 0.0
         rows, columns = left.any(axis=1), left.any(axis=0)
         left, size = left[rows][:, columns], size[rows][:, columns]
         if not left.size:
             break
+        # candidates: the largest of its row and its column
         most = np.abs(left)
         largest = (most == most.max(axis=1, keepdims=True)) & (most == most.max(axis=0, keepdims=True))
         there = most > 0.0
+        # entries alone in a line cost no fill, and lose nothing
         alone = there & ((there.sum(axis=1, keepdims=True) == 1) | (there.sum(axis=0, keepdims=True) == 1))
         among = alone if alone.any() else largest
         i, j = np.unravel_index(np.argmax(np.divide(most, size, out=np.zeros_like(most), where=among)), left.shape)
+        # one step of elimination; magnitudes grow by what is taken off
         column, row = left[:, j] / left[i, j], left[i].copy()
         left = left - np.outer(column, row)
         size = size + np.outer(np.abs(column), np.abs(row))

@@ -27,6 +27,7 @@ def unique(system: System, jyd: Floats) -> NDArray[np.bool_]:
     """[unknowns]: derivatives that F = 0 determines: none moves along what dF/dyd leaves open; of matrices for which
     that would cost too much all that occur.
     """
+    # entries of rates that occur at the start
     there = jyd != 0.0
     row, column, value = system.pattern.row[there], system.pattern.columns_of()[there], jyd[there]
     free = free_unknowns((system.rows, system.unknowns), (row, column, value))
@@ -37,11 +38,14 @@ def determined_rates(system: System, start: ConsistentState) -> NDArray[np.bool_
     """[observed]: elements of block observe whose derivative follows from the equations."""
     y, yd = start.for_form(system)
     jyd = system.slopes(start.t, y, yd, rate=True)
+    # rates that are open; of momenta the flows follow
     free = ~unique(system, jyd)
     free[with_flows(system)[1]] = False  # functions of the tested momenta
     found = np.ones(system.observed_rows("observe_rate")[1], dtype=bool)
+    # all rates are determined
     if not free.any():
         return found
+    # at the state and beside it: with other open rates the same values, or no numbers
     for k, size in enumerate((0.0, MOVED)):
         part, times = (uniform(y.size, place, k * y.size) for place in (0, 1))
         there = y + size * (np.abs(y) + MOVED) * (0.5 + 0.5 * part)

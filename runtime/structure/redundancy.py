@@ -75,6 +75,7 @@ def _reacting(system: System, idle: Ints) -> _Places:
         pattern, mine = system.pattern, system.are("kappa", "mu").copy()
         mine[idle] = False
         columns, multipliers = pattern.columns_of(), np.flatnonzero(mine)
+        # reactions: entries of multipliers in the balances
         entry = np.flatnonzero(mine[columns] & system.of_groups("dynamics")[pattern.row])
         places = entry, np.searchsorted(multipliers, columns[entry]), pattern.row[entry]
         return _Places(multipliers, *(place.astype(np.int32) for place in places))
@@ -85,11 +86,13 @@ def _reacting(system: System, idle: Ints) -> _Places:
 def reactions(system: System, jy: Floats, *, every: bool = False) -> Reactions:
     """J from the reactions of the multipliers (virtual displacements) of constraints that hold now, or of every one."""
     all_ = _reacting(system, NONE if every else system.idle_multipliers())
+    # entries beside the largest of a multiplier count
     value, largest = jy[all_.entry], np.zeros(all_.multipliers.size)
     np.maximum.at(largest, all_.which, np.abs(value))
     real = np.abs(value) > NOISE * largest[all_.which]
     which, value = all_.which[real], value[real]
     row = all_.row[real]
+    # equilibrated, so that one threshold serves
     scale, other = sparse_factors(which, row, np.abs(value), (all_.multipliers.size, system.rows))
     return Reactions(which, row, scale[which] * value * other[row], all_.multipliers, system.rows, scale)
 
@@ -98,6 +101,7 @@ def dependent(found: Reactions) -> Ints:
     """Constraints (places in `multipliers`) that depend on those before them.  Not asked where every row in its turn
     alone stands in some column: those are independent.
     """
+    # rows that stand alone in a column are peeled off; the rest is asked
     m, peeled = found.multipliers.size, np.zeros(found.multipliers.size, dtype=np.int32)
     entries, own = (lib.pointer(item) for item in (found.which, found.row, found.value)), 1.0 + uniform(m)
     left = lib.core.sd_peel(m, found.rows, found.value.size, *entries, PIVOT, lib.pointer(peeled))
@@ -138,10 +142,12 @@ def nearby(system: System, state: ConsistentState) -> list[Floats]:
     x = starter.unknowns(state.t, state.y, state.yd)
     size, moves = _moves(system, state)
     rows, free = starter.groups("phi"), starter.moves("q")
+    # seeded moves, smaller until the point returns to phi
     for move in moves:
         for amplitude in AMPLITUDES:
             shaken = x + amplitude * np.append(move, np.zeros(x.size - move.size))
             there = solve(problem_of(starter, state.t, shaken, shaken, rows=rows, free=free), shaken)
+            # consistent again, and near: not another branch
             near = np.abs(there.x - x)[: size.size] <= NEAR * amplitude * size
             if there.residual < EXACT and near.all():
                 found.append(there.x[: size.size])
@@ -155,10 +161,12 @@ def vanishing_constraints(system: System, state: ConsistentState) -> Ints:
     zero on phi alone (a circle of radius 0) has its size.
     """
     reacting = _reacting(system, system.idle_multipliers())
+    # no constraints
     entry, which, number = reacting.entry, reacting.which, reacting.multipliers.size
     if not number:
         return NONE
     beside = BESIDE * _moves(system, state)[1]
+    # the state, then points beside it
     a, found = np.zeros((1 + POINTS, system.form.extended)), np.zeros((1 + POINTS, number))
     a[:, : state.y.size] = state.y
     a[1:, : state.y.size] += beside

@@ -94,8 +94,10 @@ def pencil_index(e: Floats, b: Floats) -> int | None:
     """Index of e x' + b x = 0 [n, n]; None where the pencil is singular (or the index above MAX_INDEX)."""
     e, b = equilibrate(e, b)
     n = e.shape[0]
+    # one differentiation more as long as dE/dy' is singular
     for index in range(MAX_INDEX + 1):
         u, sigma, _ = singular_decomposition(e)
+        # rank 0 where nothing is left of e
         rank = count(sigma) if sigma.max(initial=0.0) > TOLERANCE else 0
         if rank == n:
             return index
@@ -113,6 +115,7 @@ def null_vectors(e: Floats, b: Floats) -> tuple[Floats, Floats]:
 
     A singular pencil is singular at every cj; a regular one whose entries lie far apart is badly scaled at most.
     """
+    # at one generic step; others only where that seems singular
     e, b = equilibrate(e, b)
     u, sigma, vt = singular_decomposition(b + GENERIC * e)
     rank = count(sigma, CERTAIN)
@@ -129,6 +132,7 @@ def _regular(matrix: Floats) -> bool:
 def null_place(system: System, jy: Floats, jyd: Floats) -> tuple[tuple[str, ...], int]:
     """Unknowns in the null vectors of dF/dy + cj dF/dyd, () where it is regular; its row."""
     columns, rows = null_vectors(system.dense(jyd), system.dense(jy))
+    # regular
     if not columns.size:
         return (), -1
     null = np.abs(columns).max(axis=1)
@@ -149,6 +153,7 @@ def _growth_index(system: System, matrix: list[Floats]) -> int | None:
     del columns, row, column
     for values in (jy, jyd):
         values *= scale
+    # rates alone differ from step to step
     moving = np.flatnonzero(jyd).astype(np.int32)
     rates = jyd[moving]
     del scale, values, jyd
@@ -156,6 +161,7 @@ def _growth_index(system: System, matrix: list[Floats]) -> int | None:
     if system.unknowns > LARGE:  # the room counts; the factors hold to the pattern at hand
         system.put_away(whole=True)
     try:
+        # where one rate does not tell, the next
         for rate in RATES:
             index = _growth(linear, jy, (moving, rates), rate)
             if index is not None:
@@ -174,14 +180,17 @@ def _growth(linear: Any, jy: Floats, jyd: tuple[Ints, Floats], rate: float) -> i
     sizes, least = [], 1.0
     moving, rates = jyd
     values = lib.reader(linear.contents.scaled, jy.size)  # of a large one the room counts
+    # two steps, a factor of ten apart
     for cj in (10.0 * rate, rate):
         values[:] = jy
         values[moving] += cj * rates
         size, pivot = _inverse(linear, values)
+        # singular there
         if not (np.isfinite(size) and size > 0.0):
             return None
         least = min(least, pivot)
         sizes.append(size)
+    # the inverse grows with the power index - 1
     growth = float(np.log10(sizes[0] / sizes[1]))
     tells = least >= RESOLVED and abs(growth - round(growth)) <= CLEAR
     return round(growth) + 1 if (tells or rate == RATES[-1]) and 0 <= round(growth) + 1 <= MAX_INDEX else None
@@ -192,6 +201,7 @@ def _inverse(linear: Any, values: Floats) -> tuple[float, float]:
     if lib.core.sd_linear_factor(linear, lib.pointer(values), None):
         return np.inf, 0.0
     random, largest = np.random.default_rng(3), 0.0
+    # random right sides
     for _ in range(SIDES):
         side = random.standard_normal(int(linear.contents.n))
         lib.core.sd_linear_solve(linear, lib.pointer(side))
@@ -220,6 +230,7 @@ def _rouse_slopes(system: System, t: float, jy: Floats) -> Floats:
     np.maximum.at(largest, rows, np.abs(jy))
     # numbers that no symmetry makes dependent
     least = ROUSED * (1.0 + np.arange(jy.size) / max(jy.size, 1)) * largest[rows]
+    # steep laws that are asleep, and not zero for good
     asleep = system.steep_rows(t)[rows] & (np.abs(jy) < least) & (jy != 0.0)
     return np.where(asleep, np.copysign(least, jy), jy)
 
@@ -239,6 +250,7 @@ def index_of(system: System, state: ConsistentState) -> tuple[int | None, tuple[
     if system.unknowns > DENSE:  # of a large model the room counts: nobody holds its point meanwhile
         return _growth_index(system, list(system.jacobian(state.t, *state.for_form(system)))), ()
     point = state.t, *state.for_form(system)
+    # undetermined at the state: what holds beside it
     index, undetermined = _index_at(system, *point)
     return _index_beside(system, *point, undetermined) if undetermined else index, undetermined
 
@@ -248,16 +260,19 @@ def _index_beside(system: System, t: float, y: Floats, yd: Floats, undetermined:
     in one sense: laws that are flat there alone (turbulent valves at rest, side by side) determine what passes, for
     they are monotone.  At a fold the sense changes: None.
     """
+    # efforts and flows that are open
     moved = [k for k in np.flatnonzero(system.are("e", "f")).tolist() if system.name(k) in undetermined]
     if not moved:
         return None
     size, senses, found = balanced_sizes(system, y, system.jacobian(t, y, yd)[0])[moved], set[float](), None
+    # ways to both sides of the state
     for way in normal(WAYS, len(moved)):
         for side in (BESIDE, -BESIDE):
             beside = y.copy()
             beside[moved] += side * size * way
             found = _index_at(system, t, beside, yd)[0]
             jy, jyd = (system.dense(slopes) for slopes in system.jacobian(t, beside, yd))
+            # the sign of the determinant: another one is a fold
             senses.add(float(np.linalg.slogdet(equilibrate(jy + GENERIC * jyd)[0])[0]))
             if found is None or len(senses) > 1:
                 return None
@@ -265,11 +280,12 @@ def _index_beside(system: System, t: float, y: Floats, yd: Floats, undetermined:
 
 
 def _index_at(system: System, t: float, y: Floats, yd: Floats) -> tuple[int | None, tuple[str, ...]]:
-    """The same at a point."""
+    """Index at a point, and the unknowns that the pencil leaves open there."""
     if system.unknowns == 0:
         return 0, ()
     jy, jyd = system.jacobian(t, y, yd)
     least = None
+    # small and square: in the core, with an answer that is sure up to USUAL
     if system.unknowns <= SMALL and system.rows == system.unknowns:
         found = _small_index(system, jy, jyd)
         if 0 <= found <= USUAL:
@@ -278,7 +294,9 @@ def _index_at(system: System, t: float, y: Floats, yd: Floats) -> tuple[int | No
     size = balanced_sizes(system, y, jy)[system.pattern.columns_of()]
     undetermined: tuple[str, ...] = ()
     names: tuple[str, ...] = ()
+    # as it is, in sizes of the unknowns, with steep laws awake
     looks = (jy, jyd), (jy * size, jyd * size), (_rouse_slopes(system, t, jy * size), jyd * size)
+    # the first that tells
     for at, rates in looks[0 if least is None else 1 :]:
         names = null_place(system, at, rates)[0]
         index = None if names else pencil_index(system.dense(rates), system.dense(at))
@@ -296,6 +314,7 @@ def _sliding_index(system: System, state: ConsistentState) -> tuple[int | None, 
     set-valued relations turn.
     """
     p, (index, undetermined) = system.description.p, index_of(system, state)
+    # laws that can slide do, relations that can hold do: one after the other
     others = [(place, SLIDES) for place in system.description.branches]
     others += [(place, 1.0 - p[place]) for place in system.description.holds]
     for place, other in others:
@@ -311,10 +330,12 @@ def _sliding_index(system: System, state: ConsistentState) -> tuple[int | None, 
 def _highest_index(system: System, state: ConsistentState) -> tuple[int | None, tuple[str, ...]]:
     """The index that the model may come to, with every constraint that may hold, as far as they are independent."""
     switches = system.description.switches
+    # nothing holds at times
     index, undetermined = _sliding_index(system, state)
     if not switches.places or index is None:
         return index, undetermined
     before = switches.active.copy()
+    # all hold that may, but for those that then depend on others
     try:
         switches.set(np.ones_like(before))
         y, yd = state.for_form(system)
@@ -335,6 +356,7 @@ def structure(system: System, state: ConsistentState) -> Structure:
     left = dependent(found)
     zero = vanishing_constraints(system, state)
     lowest = np.union1d(left, zero).size if zero.size else left.size
+    # dependent here: whether they are so beside the state
     if left.size:
         # a rank that is smaller here alone is the configuration's, not the constraints'
         for point in nearby(system, state):
@@ -347,6 +369,7 @@ def structure(system: System, state: ConsistentState) -> Structure:
         left = np.setdiff1d(left, np.setdiff1d(zero, found.which)).astype(np.int32)
     lost = lowest - int(left.size)
     n = int(system.are("f").sum())
+    # multipliers of what does not hold do not count
     idle = system.idle_multipliers()
     m1, m2 = (int(system.are(kind).sum() - system.are(kind)[idle].sum()) for kind in ("kappa", "mu"))
     places = found.multipliers

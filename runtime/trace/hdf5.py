@@ -42,6 +42,7 @@ def _texts(texts: list[str]) -> tuple[NDArray[Any], Any]:
 def say(owner: Any, values: Mapping[str, Any]) -> None:
     """Scalar attributes of an object [its identifier] that has none of these names: texts of fixed length, numbers."""
     for name, value in values.items():
+        # HDF5 has no empty fixed-length text
         if isinstance(value, str):
             held, kind = _texts([value or " "])
         else:
@@ -51,8 +52,9 @@ def say(owner: Any, values: Mapping[str, Any]) -> None:
 
 
 def say_again(owner: Any, values: Mapping[str, Any]) -> None:
-    """The same; what stands there under these names is replaced."""
+    """Scalar attributes of an object [its identifier]; what stands there under these names is replaced."""
     for name in values:
+        # an attribute cannot be overwritten with another size
         if h5a.exists(owner, name.encode()):
             h5a.delete(owner, name.encode())
     say(owner, values)
@@ -67,7 +69,7 @@ def _timeless() -> Any:
 
 @cache
 def _growing(block: int) -> Any:
-    """The same in blocks of so many numbers, nan where nothing is written."""
+    """A creation list of data sets in blocks of so many numbers, nan where nothing is written."""
     made = _timeless()
     made.set_chunk((block,))
     made.set_fill_value(np.array(np.nan))
@@ -88,6 +90,7 @@ def column(file: Any, name: str, block: int, about: Mapping[str, Any], scale: An
     space = h5s.create_simple((0,), (h5s.UNLIMITED,))
     made = h5d.create(file, name.encode(), h5t.IEEE_F64LE, space, _growing(block), _path())
     say(made, about)
+    # time is the scale of all others
     if scale is not None:
         h5ds.attach_scale(made, scale, 0)
     return made
@@ -131,6 +134,7 @@ def scalars(group: Any) -> dict[str, tuple[float, str]]:
     data set.
     """
     held, found = np.empty(()), {}
+    # one scalar after the other, through one buffer
     for stored in group.id:
         name, data = stored.decode(errors="surrogateescape"), h5o.open(group.id, stored)
         if not isinstance(data, h5d.DatasetID) or data.shape != ():
@@ -145,6 +149,7 @@ def _text_attribute(data: Any, name: bytes, without: str) -> str:
     if not h5a.exists(data, name):
         return without
     attribute = h5a.open(data, name)
+    # a text of variable length: by h5py
     if attribute.shape != () or attribute.dtype.kind != "S":
         return str(h5py.Dataset(data).attrs[name])
     text = np.empty((), dtype=attribute.dtype)

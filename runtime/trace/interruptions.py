@@ -14,10 +14,12 @@ def defer_interruptions() -> Iterator[None]:
     """What ends a command (Ctrl-C, SIGTERM, SIGHUP) counts at the end of the block where Python handles it; in other
     threads than the main one there is none.
     """
+    # signals are handled in the main thread alone
     if threading.current_thread() is not threading.main_thread():
         yield
         return
     held: list[tuple[int, FrameType | None]] = []
+    # those of this system that Python handles
     ends = [getattr(signal, name) for name in ("SIGINT", "SIGTERM", "SIGHUP") if hasattr(signal, name)]
     before = {number: handler for number in ends if callable(handler := signal.getsignal(number))}
     for number in before:
@@ -27,5 +29,6 @@ def defer_interruptions() -> Iterator[None]:
     finally:
         for number, handler in before.items():
             signal.signal(number, handler)
+        # the first that came, as if it came now
         for number, frame in held[:1]:
             before[number](number, frame)

@@ -86,6 +86,7 @@ class Held:
 
     def _taken_rows(self) -> Met:
         """Of all rows so far: of runs that are not kept nobody asks."""
+        # rows that came since the last time
         while self._asked < len(self._rows):
             self._met.take(self._rows[self._asked])
             self._asked += 1
@@ -95,11 +96,13 @@ class Held:
         self, nominal: Mapping[str, float], attributes: Attributes, final: bool, events: Sequence[Happened] = ()
     ) -> None:
         """The trace as `Trace.open` would read it from a file."""
+        # given up already
         if self.closed:
             return
         layout = self._layout
         width = BEFORE + 2 * layout.observed
         rows = np.concatenate(self._rows) if self._rows else np.zeros((0, width))
+        # quantities by their columns
         data = {
             c.name: Quantity(
                 c.name,
@@ -110,6 +113,7 @@ class Held:
             )
             for c in layout.columns
         }
+        # the audit stands in the head of each row
         energy = Quantity("audit.energy", rows[:, 6].copy(), "J", self._taken_rows().turned_over, None)
         constraints = Quantity("audit.constraints", rows[:, 7].copy(), "1", None, None)
         data |= {"audit.energy": energy, "audit.constraints": constraints}

@@ -28,6 +28,7 @@ def open_regular(path: str | Path, **options: Any) -> Any:
 
     regular(path)
     file = h5py.File(path, "r", **options)
+    # a file that names others is closed at once
     try:
         _verify_alone(file, os.stat(path).st_size)  # noqa: PTH116
     except BaseException:
@@ -39,6 +40,7 @@ def open_regular(path: str | Path, **options: Any) -> Any:
 def regular(path: str | Path) -> None:
     """OSError where the path is a folder, a pipe or a device: reading one may wait for ever."""
     mode = os.stat(path).st_mode  # noqa: PTH116 (a Path's stat says the same)
+    # folders, pipes and devices
     if stat.S_ISDIR(mode):
         raise IsADirectoryError(errno.EISDIR, "this is a directory", str(path))
     if not stat.S_ISREG(mode):
@@ -64,6 +66,7 @@ def replaceable(path: str | Path, *, sweep: bool = False) -> bool:
     """
     import h5py
 
+    # nothing there, empty, or ours of the same kind
     try:
         if not os.stat(path).st_size:  # noqa: PTH116
             return True
@@ -72,10 +75,12 @@ def replaceable(path: str | Path, *, sweep: bool = False) -> bool:
             return _outside_but_parameters(file) is None and _is_ours(file) and of_sweep(file) == sweep
     except FileNotFoundError:
         return True
+    # held by another program, or by a run of ours
     except BlockingIOError as error:
         if being_written(Path(path).resolve()):
             return True
         raise OSError(error.errno, "another program holds this file open to write it", str(path)) from error
+    # unreadable: ours only while a run writes it
     except (OSError, RuntimeError, ValueError, KeyError, TypeError):
         return being_written(Path(path).resolve())
 
@@ -90,6 +95,7 @@ def _outside_but_parameters(file: Any) -> str | None:
     """As `_outside`; parameters, tens of thousands behind a netlist, are left out: nothing is read of what goes."""
     from h5py import h5d, h5g, h5l, h5o
 
+    # links of other kinds, and data that stand elsewhere
     for name in file.id:
         kind = file.id.links.get_info(name).type
         item = h5o.open(file.id, name) if kind == h5l.TYPE_HARD and name != b"parameters" else None
@@ -108,6 +114,7 @@ def _verify_alone(file: Any, size: int) -> None:
     outside = _outside(file.id, claimed)
     if outside is not None:
         raise OSError(f"'{outside}' leads to another file: not followed")
+    # a file that claims more than it can hold
     if claimed[0] > PACKED * size + SMALL:
         raise OSError(f"its {size} bytes claim to hold {claimed[0]:.3g}: it is damaged")
 
@@ -116,6 +123,7 @@ def _outside(group: Any, claimed: list[int]) -> str | None:
     """The first link or data set below a group that leads out of the file; claimed: grows by the bytes of the data."""
     from h5py import h5l, h5o
 
+    # soft and hard links stay inside
     def link(name: bytes, info: Any) -> str | None:
         return None if info.type in (h5l.TYPE_HARD, h5l.TYPE_SOFT) else _shown_name(name)
 

@@ -43,6 +43,7 @@ class Quantity(NDArrayOperatorsMixin):
 
     def __getattr__(self, name: str) -> Any:
         """What arrays have: `shape`, `max()`, ..."""
+        # copying and pickling ask for private names
         if name.startswith("_"):
             raise AttributeError(name)
         return getattr(self.values, name)
@@ -65,6 +66,7 @@ class Quantity(NDArrayOperatorsMixin):
 @contextlib.contextmanager
 def _raise_trace_errors(path: Path) -> Iterator[None]:
     """What h5py raises of a file whose layout makes no sense as TraceError."""
+    # a layout that no trace has
     try:
         yield
     except (KeyError, TypeError, AttributeError, OverflowError, MemoryError) as error:
@@ -112,6 +114,7 @@ class Trace:
         path = Path(file)
         with _raise_trace_errors(path), input_output(path), open_regular(path) as source:
             data = {name: item for name, item in source.items() if isinstance(item, h5py.Dataset)}
+            # files of other kinds
             if "time" not in data:
                 raise ValueError("no data set 'time': not a trace")
             if of_sweep(source):
@@ -125,11 +128,14 @@ class Trace:
                 if isinstance(item, h5py.Dataset)
             }
             rates = {n: item for n, item in source.get("derivatives", {}).items() if isinstance(item, h5py.Dataset)}
+            # a run that was killed may have flushed one row more of some of them
             length = min(item.shape[0] for item in (*data.values(), *group.values(), *rates.values()) if _is_row(item))
             quantities = {}
+            # quantities, and the audit by its path
             for name, item in (*data.items(), *group.items()):
                 if name == "time" or not _is_row(item):
                     continue
+                # rates stand at the path that the quantity names
                 path_of = _plain(item.attrs.get("derivative", ""))
                 known: Any = source[path_of] if path_of and path_of in source else None
                 rate = np.asarray(known[:length]) if _is_row(known) else None
@@ -152,6 +158,7 @@ class Trace:
             Column(name, k, self[name].units, name, self[name].derivative is not None) for k, name in enumerate(names)
         ]
         rows = np.full((self.time.size, BEFORE + 2 * width), np.nan)
+        # the head of a row: instant and audit
         rows[:, 0] = self.time
         for place, name in ((6, "audit.energy"), (7, "audit.constraints")):
             rows[:, place] = self[name]
@@ -159,6 +166,7 @@ class Trace:
             rows[:, BEFORE + column.place] = self[column.name]
             if column.derivative:
                 rows[:, BEFORE + width + column.place] = self[column.name].derivative
+        # numbers and attributes as they were read
         parameters = tuple(TraceParameter(name, value, unit) for name, (value, unit) in self.parameters.items())
         nominal = {n: {"nominal": self[n].nominal} for n in names if self[n].nominal is not None}
         energy = {"/audit/energy": {"nominal": self["audit.energy"].nominal or 0.0}}
@@ -166,6 +174,7 @@ class Trace:
         last: dict[str, Any] = {name: self.attributes[name] for name in closing}
         path = Path(file)
         with input_output(path):
+            # an old trace at this path goes
             path.unlink(missing_ok=True)
             store = Store(path, Layout(tuple(columns), width, self.attributes, parameters))
             store.append(rows)
@@ -201,6 +210,7 @@ class Trace:
 
     def _key(self, name: str) -> str:
         """The name as it stands in the file: '/' in a quotient is U+2215 there."""
+        # the audit by its path or by its name
         if "audit" in name:
             name = name.removeprefix("/").replace("audit/", "audit.")
         spelled = trace_name(name)

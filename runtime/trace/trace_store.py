@@ -68,6 +68,7 @@ def columns_of(description: Description) -> tuple[Column, ...]:
     place = 0
     for k in description.rows_of("observe"):
         row = description.rows[k]
+        # every element is a column where its row is stored
         for position in range(row.size):
             if row.stored:
                 name = trace_name(row.name_of(position))
@@ -80,6 +81,7 @@ def columns_of(description: Description) -> tuple[Column, ...]:
 def in_words(error: Exception) -> str:
     """What the operating system or HDF5 says; of a file that is none of HDF5's, so."""
     said = getattr(error, "strerror", None) or (str(error).splitlines() or [type(error).__name__])[0]
+    # HDF5's own words, for readers
     for sign, words in (("file signature not found", "this is no HDF5 file"), ("truncated file", "it is cut short")):
         if sign in said:
             return f"not readable as a trace: {words}"
@@ -101,6 +103,7 @@ def _keep(group: Any, parameters: Sequence[TraceParameter]) -> None:
 
     templates: dict[str, Any] = {}
     for parameter in parameters:
+        # one template for each unit, copied
         template = templates.get(parameter.unit)
         if template is None:
             template = templates[parameter.unit] = hdf5.template(group, parameter.unit)
@@ -111,6 +114,7 @@ def clear(path: Path) -> None:
     """Remove the stores that killed runs left beside a trace, which is claimed: no living run has any."""
     name = re.compile(re.escape(f".{path.name}.") + r"[0-9a-f]{8}\.[ab](\.link)?")
     with contextlib.suppress(OSError), os.scandir(path.parent) as items:
+        # files of this trace's name alone, and no links
         left = [item.path for item in items if name.fullmatch(item.name) and item.is_file(follow_symlinks=False)]
         for item in left:
             with contextlib.suppress(OSError):
@@ -119,6 +123,7 @@ def clear(path: Path) -> None:
 
 def _most() -> float:
     """Bytes that a file of this process may have."""
+    # Windows has no such limits
     try:
         import resource
     except ImportError:  # Windows
@@ -130,6 +135,7 @@ def _most() -> float:
 @contextlib.contextmanager
 def _raise_file_limit() -> Iterator[None]:
     """Files may have what the hard limit lets them have."""
+    # raised while it is needed, then as before
     try:
         import resource
     except ImportError:  # Windows
@@ -159,12 +165,15 @@ class Store:
         self._closed = False
         self._sets: list[tuple[Any, str, int]] = []
         self._room(0 if like is None else like._length)
+        # a copy of what is on the disk
         if like is not None:
             shutil.copyfile(like.path, path)
         mode = "x" if like is None else "r+"
         self._file = h5py.File(path, mode, libver=("earliest", "v110"))
+        # readers may open it while it grows
         with contextlib.suppress(OSError):
             unlock(self._file.id.get_vfd_handle())
+        # a store that could not be made leaves no open file
         try:
             if like is None:
                 hdf5.say(self._file.id, {**layout.attributes, "final": np.int64(0), "met": np.int64(0), "judged": ""})
@@ -180,6 +189,7 @@ class Store:
     def is_read(self) -> bool:
         """Somebody opened it while it was the trace, and has not closed it: what is read must not change."""
         handle = self._file.id.get_vfd_handle()
+        # a lock that can be had: nobody reads
         try:
             if lock(handle):  # else locks do not work here: HDF5 took none either
                 unlock(handle)
@@ -190,6 +200,7 @@ class Store:
         return False
 
     def _create(self, layout: Layout) -> None:
+        """Lays out time, quantities with their rates, the audit and the parameters of an empty store."""
         from sysdyn.runtime.trace import hdf5
 
         time = self._data("time", "s", "time", None, 0)
@@ -199,12 +210,14 @@ class Store:
             hdf5.say(data, {"nominal": 0.0})
             group, _, member = column.name.partition(".")
             if group == "audit" and member not in ("energy", "constraints"):
+                # quantities of the audit are linked where the audit is
                 hdf5.link(self._file.id, f"/audit/{member}", data)
             if column.derivative:
                 path = f"/derivatives/{column.name}"
                 unit = f"({column.unit})/s" if column.unit != "1" else "1/s"
                 name = f"time derivative of {column.long_name}"
                 self._data(path, unit, name, time, BEFORE + layout.observed + column.place)
+                # a quantity names its rate
                 hdf5.say(data, {"derivative": path})
         for path, unit, name, place in (
             ("/audit/energy", "J", "balance of stored, dissipated and supplied energy since the start", 6),
@@ -226,6 +239,7 @@ class Store:
         """Appends rows and flushes."""
         from sysdyn.runtime.trace import hdf5
 
+        # refused before anything is written
         self._room(rows.shape[0])
         first, self._length = self._length, self._length + rows.shape[0]
         for data, _, place in self._sets:
@@ -235,6 +249,7 @@ class Store:
     def _room(self, rows: int) -> None:
         """Refuses to begin what the disk, or a limit on the size of files, cannot hold."""
         blocks = rows // BLOCK + 2
+        # whole blocks: HDF5 grows by these
         whole = len(self._sets) * blocks * BLOCK * 8
         need = whole // (1 if rows >= BLOCK else 4) + HEAD
         size = self.path.stat().st_size if self.path.exists() else 0
@@ -247,11 +262,13 @@ class Store:
         """Events, attributes by data set ("/": the root), then closes the file."""
         from sysdyn.runtime.trace import hdf5
 
+        # events are written once, at the end
         if events:
             time = hdf5.whole(self._file.id, "/events/time", np.array([e.time for e in events]))
             hdf5.say(time, {"units": "s"})
             for name in ("name", "element", "before", "after"):
                 hdf5.whole(self._file.id, f"/events/{name}", [getattr(e, name) for e in events])
+        # nominal values and verdicts stand there already as zeros
         for name, values in attributes.items():
             hdf5.say_again(self._file[name].id, values)
         self._file.flush()
@@ -272,10 +289,12 @@ class Store:
         self._closed = True
         with _raise_file_limit():
             with contextlib.suppress(Exception):
+                # the file goes on in memory, where writes succeed
                 handle = self._file.id.get_vfd_handle()
                 copy = os.memfd_create("sysdyn-trace")
                 size, offset = os.fstat(handle).st_size, 0
                 while offset < size:
+                    # nothing more to copy
                     sent = os.sendfile(copy, handle, offset, size - offset)
                     if sent == 0:
                         break

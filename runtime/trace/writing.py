@@ -47,6 +47,7 @@ class Met:
 
     def take(self, rows: Floats) -> None:
         """Rows [k, 8 + 2 observed]."""
+        # energies, then values
         self._energy(rows[:, 2:6])
         values = rows[:, self._places]
         size = np.abs(values)
@@ -54,6 +55,7 @@ class Met:
         self._ends[1] = np.fmax(self._ends[1], np.fmax.reduce(values))
         most = size.max(axis=0)
         self._largest = np.fmax(self._largest, most)
+        # the first value that is no number, and when
         if self.undefined is None and not np.isfinite(most).all():
             k, place = np.argwhere(~np.isfinite(size))[0]
             self.undefined = self.columns[place].name, float(rows[k, 0])
@@ -63,6 +65,7 @@ class Met:
 
         At least what round-off is beside the stored energy.
         """
+        # energies are counted from the first row
         if self._energies is None:
             self._energies = np.array([0.0, rows[0, 1], 0.0, 0.0])
         with np.errstate(invalid="ignore", over="ignore"):  # energies beyond double precision: the ledger says so
@@ -101,6 +104,7 @@ class TraceWriter:
         with input_output(self.path):
             self.path = destination(self.path)
             self._token = os.urandom(4).hex()
+            # a first run is seen at once
             if shown:
                 self._visible = self._store("a")
                 self._publish(self._visible)
@@ -111,6 +115,7 @@ class TraceWriter:
     def _publish(self, store: Store) -> None:
         """The trace's name for this store, in one step."""
         link = store.path.with_name(store.path.name + ".link")
+        # a link that a killed run left
         with contextlib.suppress(FileNotFoundError):
             link.unlink()
         link.hardlink_to(store.path)
@@ -122,6 +127,7 @@ class TraceWriter:
             self._waiting.append(rows)
             self._numbers += rows.size
             self._met.take(rows)
+        # much is waiting, or the last time is long ago
         if self._numbers > MANY or time.monotonic() - self._flushed > FLUSH_SECONDS:
             self.flush()
 
@@ -140,6 +146,7 @@ class TraceWriter:
     def flush(self) -> None:
         """All rows so far stand in the trace."""
         self._flushed = time.monotonic()
+        # without new rows the trace stands as it is
         if self._waiting or self._visible is None:
             self._turn(None)
 
@@ -152,23 +159,30 @@ class TraceWriter:
             self._turned_rows(last, events)
 
     def _turned_rows(self, last: Mapping[str, Mapping[str, Any]] | None, events: Sequence[Happened]) -> None:
+        """Writes the rows that wait to the hidden store and lets it take the trace's name; last: closing attributes."""
         new, self._waiting, self._numbers = self._waiting, [], 0
         try:
             with input_output(self.path):
+                # somebody reads the hidden store: another one is made
                 if self._hidden is not None and self._hidden.is_read():
                     self._drop_hidden()
+                # a copy of the visible one
                 if self._hidden is None:
                     self._hidden, self._late = self._store(self._other, like=self._visible), []
                 rows = [*self._late, *new]
+                # rows that it lacks, then those that came
                 if rows:
                     self._hidden.append(np.concatenate(rows))
+                # the last time: attributes and events too
                 if last is not None:
                     self._hidden.close_with(last, events)
                 self._publish(self._hidden)
+        # no room: what fits is kept
         except TraceError as error:
             self._drop_hidden()
             kept = self._keep_what_fits(np.concatenate(new)) if new else 0
             self.discard()
+            # the reader is told that the trace is not whole
             if kept:
                 raise TraceError(f"{error} (the trace holds what fitted)") from error
             raise
@@ -190,6 +204,7 @@ class TraceWriter:
     def _keep_what_fits(self, rows: Floats) -> int:
         """On a disk that is full: the first rows for which there is room reach the trace; their number."""
         count = int(rows.shape[0])
+        # half of the rows, until some fit
         while count:
             store: Store | None = None
             try:
@@ -211,6 +226,7 @@ class TraceWriter:
         events: Sequence[Happened] = (),
     ) -> None:
         """Nominal values, last attributes, `final`, events; closes the file.  One that was given up stays as it is."""
+        # given up already
         if self.closed:
             return
         sizes = {column.name: {"nominal": float(nominal.get(column.name, 0.0))} for column in self._layout.columns}
@@ -221,6 +237,7 @@ class TraceWriter:
     def discard(self) -> None:
         """Closes without more ado; the trace stays as it was last flushed."""
         self.closed = True
+        # names of stores go, the trace's own stays
         for store in (self._visible, self._hidden):
             if store is not None:
                 store.close()
