@@ -17,7 +17,7 @@ from typing import Any
 import numpy as np
 from sysdyn.runtime import tuning
 from sysdyn.runtime.accuracy.options import Options, own_tolerances
-from sysdyn.runtime.integrate.rows.ledgers import Balance, turned_over
+from sysdyn.runtime.integrate.rows.ledgers import LedgerBalance, turned_over
 from sysdyn.runtime.model.description import Floats
 from sysdyn.runtime.model.failures import RowLabel
 from sysdyn.values import dataclass
@@ -70,7 +70,7 @@ class Judgement:
 
     judged: tuple[str, ...]
     not_met: tuple[Shortfall, ...]
-    conserved: tuple[Balance, ...] = ()
+    conserved: tuple[LedgerBalance, ...] = ()
     turnover: float = 0.0
 
     @property
@@ -161,7 +161,7 @@ def not_met_undefined(found: tuple[str, float] | None) -> tuple[Estimate, ...]:
 def judge(
     options: Options,
     method: str,
-    balances: Iterable[Balance],
+    balances: Iterable[LedgerBalance],
     accurate: bool,
     missed: Iterable[Estimate],
     left_open: Callable[[], Floats] | None = None,

@@ -26,7 +26,7 @@ from sysdyn.dsl.model.network import Network
 from sysdyn.dsl.model.units import si_text
 from sysdyn.dsl.names.symbols import nearest
 from sysdyn.dsl.tree import syntax
-from sysdyn.runtime.linear.modes import Mode, Transfer, modes, store_shares, transfer, wide_transfer
+from sysdyn.runtime.linear.modes import Eigenmode, Transfer, modes, store_shares, transfer, wide_transfer
 from sysdyn.runtime.linear.pencil import Descriptor
 from sysdyn.runtime.linear.states import constant, moving, quadratures
 from sysdyn.runtime.linear.tangent import Given, NoLinearisation, Outputs, Reduced, Wide, integral, rows_at
@@ -54,7 +54,7 @@ class Linearisation:
     y: Array
     descriptor: Descriptor
     reduced: Reduced
-    modes: tuple[Mode, ...]
+    modes: tuple[Eigenmode, ...]
     transfers: tuple[Transfer, ...]
     inputs: tuple[str, ...]
     outputs: tuple[str, ...]
@@ -195,7 +195,9 @@ def _seen(out: Outputs, kept: list[int]) -> Outputs:
     return Outputs(out.by_y[kept], out.by_rate[kept], (one, rate, twice))
 
 
-def _energies(found: Found, small: Reduced, own: Sequence[Mode], names: Sequence[str]) -> tuple[tuple[str, ...], Array]:
+def _energies(
+    found: Found, small: Reduced, own: Sequence[Eigenmode], names: Sequence[str]
+) -> tuple[tuple[str, ...], Array]:
     """Names of the stores and their shares of the energy of each mode."""
     at = {name: k for k, name in enumerate(names)}
     known = [s for s in contents(found.prepared.network) if s[1] in at and s[2] in at]

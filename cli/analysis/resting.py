@@ -17,7 +17,7 @@ from sysdyn.dsl.model.units import Unit, quantity
 from sysdyn.dsl.text.diagnostics import Report
 from sysdyn.runtime.accuracy.options import Progress
 from sysdyn.runtime.linear.rest import Rest
-from sysdyn.runtime.linear.stability import Verdict, energy_at, verdict
+from sysdyn.runtime.linear.stability import StabilityVerdict, energy_at, verdict
 from sysdyn.runtime.linear.tangent import NoLinearisation
 from sysdyn.runtime.trace.trace_store import columns_of
 from sysdyn.values import dataclass
@@ -38,7 +38,7 @@ class Equilibrium:
     values: dict[str, float]
     kinds: tuple[str, ...]
     units: tuple[str, ...]
-    judged: Verdict | None
+    judged: StabilityVerdict | None
     why: str
     efforts: dict[str, tuple[float, Unit]] = field(default_factory=dict)
 

@@ -22,7 +22,7 @@ from sysdyn.dsl.text.diagnostics import Report
 from sysdyn.runtime.events.plan import Plan
 from sysdyn.runtime.events.start import eventful_start
 from sysdyn.runtime.linear.contact_rest import ContactRest, SampledRest
-from sysdyn.runtime.linear.rest import Equations, Rest, Resting, rests
+from sysdyn.runtime.linear.rest import Rest, RestEquations, Resting, rests
 from sysdyn.runtime.model.description import Floats
 from sysdyn.runtime.model.failures import InconsistentStart
 from sysdyn.runtime.model.system import System
@@ -68,7 +68,7 @@ def resting(
     guess = _guess(system, t0, events)
     tangible = {c.name for c in prepared.compiled.energies.coordinates if c.tangible}
     # every rate zero; contacts may hold or be open, sampled values stay as they are
-    equations: Equations = Resting(system, tangible, t0, guess)
+    equations: RestEquations = Resting(system, tangible, t0, guess)
     if events.contacts:
         equations = ContactRest(system, tangible, t0, guess, events)
     if events.sampled:

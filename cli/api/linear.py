@@ -18,7 +18,7 @@ from sysdyn.dsl.text.diagnostics import ModelError, Report
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
-    from sysdyn.runtime.linear.modes import Mode, Transfer
+    from sysdyn.runtime.linear.modes import Eigenmode, Transfer
 
 
 class NoState(Exception):  # noqa: N818 (a name of the house)
@@ -37,7 +37,7 @@ class Linearised:
         self.matrices: dict[str, NDArray[Any]] = arrays(found)
         self.states, self.inputs, self.outputs = found.reduced.names, found.inputs, found.outputs
         self.unknowns = found.descriptor.states
-        self.modes: tuple[Mode, ...] = found.modes
+        self.modes: tuple[Eigenmode, ...] = found.modes
         self.transfers: tuple[Transfer, ...] = found.transfers
         self.moving, self.t = found.moving, found.t
         self.stores, self.energies = found.stores, found.energies

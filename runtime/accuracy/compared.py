@@ -1,6 +1,6 @@
 """What the runs of one simulation are compared by: their rows at common instants.
 
-Received: rows as a run writes them, and what it hands over at its end.  Handed on: `Sampled`, one beside the other in
+Received: rows as a run writes them, and what it hands over at its end.  Handed on: `RunSample`, one beside the other in
 `pairs.py`; where the last two differed most.
 """
 
@@ -13,7 +13,7 @@ from sysdyn.runtime.accuracy import fronts, pairs
 from sysdyn.runtime.accuracy.common_instants import MANY, MOST, VALUES, Instants, Thinned, common, late_by
 from sysdyn.runtime.accuracy.nominals import nominals_of_quantities, nominals_of_unknowns
 from sysdyn.runtime.accuracy.options import Options
-from sysdyn.runtime.accuracy.pairs import Sampled
+from sysdyn.runtime.accuracy.pairs import RunSample
 from sysdyn.runtime.accuracy.quantities import Quantities
 from sysdyn.runtime.integrate.request import COMPARED, RELAXING, TRACE, Finished
 from sysdyn.runtime.integrate.weights.round_off import LeftOpen, left_open
@@ -28,12 +28,12 @@ BEYOND = 100.0
 """Times its magnitude at steps: an unknown that is more within a step shows that the step passed over something."""
 
 
-class Compared:
+class RunComparison:
     """samplings: of the last two runs; finished: the last; jumps (s): its events; observed: values in a row."""
 
     def __init__(self, options: Options, instants: Instants, observed: int) -> None:
         self.options, self.instants, self._observed = options, instants, observed
-        self.samplings: tuple[Sampled, ...] = ()
+        self.samplings: tuple[RunSample, ...] = ()
         self.jumps: Floats | None = None
         self.finished: Finished | None = None
         self._at: Floats | None = None
@@ -92,7 +92,7 @@ class Compared:
                 jump = np.abs(values[same + 1] - values[same])
             self._jump = np.fmax(self._jump, jump.max(axis=0))
 
-    def sample_run(self, tolerance: float, finished: Finished, quantities: Quantities) -> Sampled:
+    def sample_run(self, tolerance: float, finished: Finished, quantities: Quantities) -> RunSample:
         """Of the run that has ended; the next is compared at its instants."""
         width = lib.ROW_HEAD + 2 * self._observed
         rows = np.concatenate(self._rows) if self._rows else np.zeros((0, width))
@@ -124,7 +124,7 @@ class Compared:
         jump = np.append(self._jump[quantities.places], np.full(len(quantities.meters), np.inf))
         # what relaxes within a first step, where a row says so
         passed = np.where(rows[:, 1:2].astype(np.int32) & RELAXING, rows[:, 2:4], 0.0)
-        found = Sampled(
+        found = RunSample(
             tolerance, values, sizes, steps, noise, open_, between, late, there, jump, len(finished.events), passed,
             self._passed_over(finished, quantities),
         )  # fmt: skip

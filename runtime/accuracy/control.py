@@ -15,9 +15,9 @@ from __future__ import annotations
 from collections.abc import Callable
 
 import numpy as np
-from sysdyn.runtime.accuracy.estimate import DEAR, LENGTHY, STRETCH, Estimate, is_held
+from sysdyn.runtime.accuracy.estimate import DEAR, LENGTHY, STRETCH, ErrorEstimate, is_held
 from sysdyn.runtime.accuracy.laws import Law
-from sysdyn.runtime.accuracy.pairs import ROUND_OFF, Sampled, difference, have_diverged
+from sysdyn.runtime.accuracy.pairs import ROUND_OFF, RunSample, difference, have_diverged
 from sysdyn.runtime.integrate.request import LONGEST
 from sysdyn.runtime.model.description import Floats
 from sysdyn.runtime.model.failures import SolverFailure
@@ -61,7 +61,7 @@ class Achieved:
         return self.error_estimate is not None and bool(self.error_estimate < ROUND_OFF)
 
 
-Run = Callable[[float, float], Sampled]
+Run = Callable[[float, float], RunSample]
 """Integrates with a tolerance and a longest step as part of the span."""
 
 
@@ -73,7 +73,7 @@ def _achievement(estimate: float, met: bool, runs: int, tolerance: float, *, los
     return Achieved(estimate, met, runs, tolerance, lost)
 
 
-def _verdict_on_like_steps(run: Run, last: Sampled, target: Floats, number: int) -> Achieved:
+def _verdict_on_like_steps(run: Run, last: RunSample, target: Floats, number: int) -> Achieved:
     """The verdict on two runs that took the same steps: what a run with other steps differs by."""
     try:
         # at most half the mean step: so the instants of the steps are others
@@ -89,7 +89,7 @@ def _is_limited(failure: SolverFailure) -> bool:
     return failure.late or failure.cause in ("max_steps", "max_wall")
 
 
-def _draft(run: Run, tolerance: float, law: Law) -> Sampled:
+def _draft(run: Run, tolerance: float, law: Law) -> RunSample:
     """The first run; where it fails, once more with smaller tolerances, where it is strained with a tame one."""
     tried = 0
     # looser at first, where that fails finer: a coarse step may leave the domain of a law
@@ -127,7 +127,7 @@ def control(
     wanted = float(np.min(target, initial=1.0))
     tolerance = law.tolerance(wanted if wanted < 1.0 else 1e-4) if first is None else max(first, law.finest)
     last = _draft(run, min(tolerance, TAME * law.ratio) if tame else tolerance, law)
-    estimate, longest = Estimate(law, target), LONGEST
+    estimate, longest = ErrorEstimate(law, target), LONGEST
     # a draft of hardly more steps than its longest allows: the motion asks for none
     still = last.steps <= 1.0 / (DRAFT * LONGEST) + QUIET
     shorter: float | None = None
@@ -173,7 +173,9 @@ def control(
     return _achievement(estimate.apart, False, number, last.tolerance)
 
 
-def _finer(run: Run, last: Sampled, tolerance: float, longest: float, law: Law, *, compared: bool) -> Sampled | None:
+def _finer(
+    run: Run, last: RunSample, tolerance: float, longest: float, law: Law, *, compared: bool
+) -> RunSample | None:
     """A run with a smaller tolerance; where it fails half the way to it, while that is worth a run, or once a little
     further: at an event a step fails by chance.
 

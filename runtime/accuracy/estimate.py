@@ -10,7 +10,7 @@ from __future__ import annotations
 import numpy as np
 from sysdyn.runtime import tuning
 from sysdyn.runtime.accuracy.laws import Law
-from sysdyn.runtime.accuracy.pairs import Sampled, before_fronts, difference, left_at_rest, passed_over
+from sysdyn.runtime.accuracy.pairs import RunSample, before_fronts, difference, left_at_rest, passed_over
 from sysdyn.runtime.model.description import Floats
 
 ROOT = 0.5
@@ -73,12 +73,12 @@ TINY = 1e-30
 """An estimate beside what was asked below which it counts as none."""
 
 
-def is_held(run: Sampled, longest: float) -> bool:
+def is_held(run: RunSample, longest: float) -> bool:
     """Whether the longest step, and not the tolerance, holds the steps."""
     return run.steps * longest < HOLDS and run.steps < ENOUGH
 
 
-def _shrink(law: Law, power: float, step: float, coarse: Sampled, fine: Sampled) -> float:
+def _shrink(law: Law, power: float, step: float, coarse: RunSample, fine: RunSample) -> float:
     """Error of the finer run over its difference from the coarser one, whose tolerance is 10^step times larger; beyond
     law.far nothing more is credited.  Of longer steps the tolerance says nothing, of hardly shorter ones where events
     happen, which may hold them.
@@ -96,7 +96,7 @@ def _shrink(law: Law, power: float, step: float, coarse: Sampled, fine: Sampled)
     return float(law.safety * ratio / (1.0 - ratio))
 
 
-def _doubt(law: Law, shrink: float, step: float, coarse: Sampled, fine: Sampled) -> float:
+def _doubt(law: Law, shrink: float, step: float, coarse: RunSample, fine: RunSample) -> float:
     """Times the estimate: what must be within what was asked, where events happen, which may hold the steps."""
     if not fine.jumps:
         return 1.0
@@ -106,7 +106,7 @@ def _doubt(law: Law, shrink: float, step: float, coarse: Sampled, fine: Sampled)
     return SURE if held else max(SURE / law.safety, 1.0)
 
 
-def _unlike(law: Law, coarse: Sampled, fine: Sampled) -> bool:
+def _unlike(law: Law, coarse: RunSample, fine: RunSample) -> bool:
     """Whether the finer run has met what the other has not seen."""
     # the finer run has other events
     if abs(fine.jumps - coarse.jumps) > OTHERS * max(fine.jumps, coarse.jumps):
@@ -119,13 +119,13 @@ def _unlike(law: Law, coarse: Sampled, fine: Sampled) -> bool:
     return fine.steps > GROWN * asked * coarse.steps
 
 
-def _affordable(coarse: Sampled, fine: Sampled) -> float:
+def _affordable(coarse: RunSample, fine: RunSample) -> float:
     """Part of the tolerance at which a run takes MORE times the steps, as they grew between the two."""
     growth = np.log(max(fine.steps, 1) / max(coarse.steps, 1)) / np.log(coarse.tolerance / fine.tolerance)
     return float(np.clip(MORE ** (-1.0 / max(growth, 1e-2)), DEEPEST, FIRST_DROP))
 
 
-class Estimate:
+class ErrorEstimate:
     """The estimate of the last of two runs, and the power with which the errors fall.
 
     over: beside what was asked, as it mostly is; apart: what is told, relative, hardly ever less than it is, but no
@@ -145,7 +145,7 @@ class Estimate:
         self._power: float | None = None
         self.root = False
 
-    def compare(self, coarse: Sampled, fine: Sampled, shorter: float | None = None) -> float:
+    def compare(self, coarse: RunSample, fine: RunSample, shorter: float | None = None) -> float:
         """Takes the pair in; returns the plain difference.  shorter: the longest step of the finer over that of the
         coarser run, where it holds both.
         """
@@ -218,7 +218,7 @@ class Estimate:
             self.apart *= doubt
         return apart
 
-    def _error_ratio(self, step: float, coarse: Sampled, fine: Sampled) -> float:
+    def _error_ratio(self, step: float, coarse: RunSample, fine: RunSample) -> float:
         """Error of the finer run over its difference from the coarser one, at most; step: decades of tolerance."""
         law = self.law
         # errors at events fall slower
@@ -227,7 +227,7 @@ class Estimate:
         ratio = min(ratio, UNSEEN)
         return float(max(law.safety, SURE) * ratio / (1.0 - ratio))
 
-    def _fastest(self, fine: Sampled) -> float:
+    def _fastest(self, fine: RunSample) -> float:
         """The power beyond which differences fall by chance; with events at the finest tolerances round-off is what is
         left, which events that follow from each other let grow.
         """

@@ -1,6 +1,6 @@
 """Two runs of one simulation beside each other: how far apart they are, at instants they share.
 
-Receives what each run hands over (`Sampled`); returns the difference of every quantity, relative to the finer run's
+Receives what each run hands over (`RunSample`); returns the difference of every quantity, relative to the finer run's
 sizes, and that beside the accuracy asked.  No difference counts: within the time tolerance, of round-off, and at once
 beside a jump.  What both did unseen between the instants, or where they ran away alike, is said.
 """
@@ -43,7 +43,7 @@ LARGEST = float(np.finfo(np.float64).max)
 
 
 @dataclass(frozen=True, slots=True)
-class Sampled:
+class RunSample:
     """What a run hands to the comparison.  values [instants, quantities] at the instants of the run before it; largest
     [quantities] against which errors are relative; steps: accepted; noise [quantities]: a quantity that stays below it
     is zero; left_open(): the same by the equations, for two runs that share no digit of one; between [instants,
@@ -77,7 +77,7 @@ class Sampled:
         return (self.values, self.late) if self.there is None else self.there
 
 
-def distance_of_runs(coarse: Sampled, fine: Sampled) -> Floats:
+def distance_of_runs(coarse: RunSample, fine: RunSample) -> Floats:
     """How far two runs' values are from each other [instants, quantities], within the time tolerance, both ways: what
     one of them has must be between values that the other one takes about there.  At the end, where a quantity grows
     without bound (x' = x^2 at its pole), its rate allows any difference, but only one of them has been so far.  Between
@@ -121,7 +121,7 @@ def lateness(time: Floats, values: Floats, rates: Floats, tolerance: float) -> F
     return tolerance * np.fmin(np.abs(rates), BEND * slopes)
 
 
-def zero(coarse: Sampled, fine: Sampled, target: Floats) -> NDArray[np.bool_]:
+def zero(coarse: RunSample, fine: RunSample, target: Floats) -> NDArray[np.bool_]:
     """Quantities [quantities] of which both runs have round-off alone, by symmetry or a balance: it is nobody's error.
 
     Beside others of their unit they are seen at once, also where they fall with the tolerance: then they are errors of
@@ -144,12 +144,12 @@ def zero(coarse: Sampled, fine: Sampled, target: Floats) -> NDArray[np.bool_]:
     return np.asarray(found)
 
 
-def _has_size(coarse: Sampled, fine: Sampled, target: Floats) -> NDArray[np.bool_]:
+def _has_size(coarse: RunSample, fine: RunSample, target: Floats) -> NDArray[np.bool_]:
     """Quantities [quantities] that are asked for, and more than round-off."""
     return np.asarray((fine.largest != 0.0) & np.isfinite(target) & ~zero(coarse, fine, target))
 
 
-def difference(coarse: Sampled, fine: Sampled, target: Floats) -> tuple[float, float]:
+def difference(coarse: RunSample, fine: RunSample, target: Floats) -> tuple[float, float]:
     """(largest relative difference, the same over the accuracy wanted) of two runs, in the finer one's sizes."""
     # quantities of size zero, or of which nothing is asked, do not count
     size = fine.largest
@@ -174,7 +174,7 @@ def difference(coarse: Sampled, fine: Sampled, target: Floats) -> tuple[float, f
     return float(relative.max()), float((relative / target[use]).max())
 
 
-def before_fronts(coarse: Sampled, fine: Sampled, target: Floats) -> tuple[float, float]:
+def before_fronts(coarse: RunSample, fine: RunSample, target: Floats) -> tuple[float, float]:
     """How far two runs are apart, relative, and that over the accuracy wanted, where the coarser one passes over a
     front in one step.
     """
@@ -186,7 +186,7 @@ def before_fronts(coarse: Sampled, fine: Sampled, target: Floats) -> tuple[float
     return float(relative.max(initial=0.0)), float((relative / target[use]).max(initial=0.0))
 
 
-def passed_over(coarse: Sampled, fine: Sampled, target: Floats, credit: float) -> tuple[float, float]:
+def passed_over(coarse: RunSample, fine: RunSample, target: Floats, credit: float) -> tuple[float, float]:
     """The error of the finer run, relative, and that over the accuracy wanted, where a first step passes over what
     relaxes at once; zeros elsewhere.  There two runs begin alike, however far both are off: what they differ by grows
     with the time since then, and with what their steps differ by.  The error is credit times what that makes of a whole
@@ -212,7 +212,7 @@ def passed_over(coarse: Sampled, fine: Sampled, target: Floats, credit: float) -
     return float(off.max()), float((off / target[use]).max())
 
 
-def left_at_rest(coarse: Sampled, fine: Sampled, target: Floats, *, known: bool = False) -> tuple[float, float]:
+def left_at_rest(coarse: RunSample, fine: RunSample, target: Floats, *, known: bool = False) -> tuple[float, float]:
     """Where two runs are farthest apart where a quantity comes to rest at zero, from there to the end: the most that is
     left of it in the finer one, relative to its size, and that over the accuracy wanted; zeros elsewhere.  What ends in
     finite time is a root of the state (the flow of a vessel that runs empty), whose error is the root of the state's,
@@ -244,7 +244,7 @@ def left_at_rest(coarse: Sampled, fine: Sampled, target: Floats, *, known: bool 
     return float(left / size[use][column]), float(left / (size * target)[use][column])
 
 
-def have_diverged(coarse: Sampled, fine: Sampled, target: Floats) -> bool:
+def have_diverged(coarse: RunSample, fine: RunSample, target: Floats) -> bool:
     """Whether two runs differ somewhere by PARTED times all that a quantity was since its start, and by much of what it
     is: then they ran away, and that both end alike, beside what has become of them, says little.  At fine tolerances a
     front that begins at next to nothing looks alike, and nothing runs away.

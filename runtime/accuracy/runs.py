@@ -12,10 +12,10 @@ from numpy.typing import NDArray
 from sysdyn.runtime import tuning
 from sysdyn.runtime.accuracy.accounts import Accounts
 from sysdyn.runtime.accuracy.common_instants import Instants
-from sysdyn.runtime.accuracy.compared import Compared
+from sysdyn.runtime.accuracy.compared import RunComparison
 from sysdyn.runtime.accuracy.control import TAME
 from sysdyn.runtime.accuracy.options import Options
-from sysdyn.runtime.accuracy.pairs import Sampled
+from sysdyn.runtime.accuracy.pairs import RunSample
 from sysdyn.runtime.accuracy.quantities import Quantities
 from sysdyn.runtime.accuracy.way import FACTORED, HELD, SPARE, STIFF, Way
 from sysdyn.runtime.events.kinks import LIVE
@@ -28,7 +28,7 @@ from sysdyn.runtime.model.failures import SolverFailure
 from sysdyn.runtime.model.scales import group_maxima
 from sysdyn.runtime.model.system import LARGE
 from sysdyn.runtime.start.start import ConsistentState
-from sysdyn.runtime.trace.keeping import Held, Writer, keeping
+from sysdyn.runtime.trace.keeping import HeldWriter, Writer, keeping
 from sysdyn.runtime.trace.trace import Column, Layout, Trace, columns_of
 from sysdyn.values import dataclass
 
@@ -67,7 +67,7 @@ class Runs:
         self.columns: tuple[Column, ...] = way.system.once("columns", lambda: columns_of(description))
         self.names = way.system.once("observed names", lambda: _observed_names(description))
         self.instants = Instants(options, description.layouts, len(self.names))
-        self.compared = Compared(options, self.instants, len(self.names))
+        self.compared = RunComparison(options, self.instants, len(self.names))
         self.accounts = Accounts(options)
         self.keeping = keeping(options.output)
         self.ceiling: Floats | None = None
@@ -282,9 +282,9 @@ class Runs:
     def held(self) -> Trace | None:
         """The trace of a run that is kept in memory, once it is closed."""
         writer = self.writer if self.done is None else self.done[2]
-        return writer.trace if isinstance(writer, Held) else None
+        return writer.trace if isinstance(writer, HeldWriter) else None
 
-    def run_sampled(self, tolerance: float, longest: float) -> Sampled:
+    def run_sampled(self, tolerance: float, longest: float) -> RunSample:
         """One run of the accuracy control; longest: step, as part of the span."""
         self.controlled = True
         # more steps than the patience allows are foreseen: not begun

@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 from sysdyn.runtime.condense.composition import Composition, places_of, ranges
 from sysdyn.runtime.condense.elimination import Mask
-from sysdyn.runtime.condense.sums import Straights, Sums, numbers_of
+from sysdyn.runtime.condense.sums import ConstantSums, Straights, numbers_of
 from sysdyn.runtime.model import core_library as lib
 from sysdyn.runtime.model.description import Floats, Ints, Kernel
 from sysdyn.runtime.model.failures import RowLabel
@@ -70,14 +70,16 @@ class Room:
             self.__dict__.pop(name, None)
 
 
-class Condensed:
+class CondensedSystem:
     """The kept unknowns and rows of a system; what Method and Settler ask of a System, with places of its own.
 
     kept, kept_rows: their places in the whole system; core: the core's structure of it; paired: row k belongs to
     unknown k; own_rows [unknowns]: where not every unknown has a row, those that are sure (-1: none).
     """
 
-    def __init__(self, system: System, found: Sums, terms: Composition, straights: Straights, kept_rows: Ints) -> None:
+    def __init__(
+        self, system: System, found: ConstantSums, terms: Composition, straights: Straights, kept_rows: Ints
+    ) -> None:
         """found: the structure; terms: as sums of kept unknowns; straights: of found."""
         self._straights = straights
         self.whole, self.sums = system, found
@@ -205,9 +207,9 @@ class Condensed:
         """Of the places of all numbers, or of those chosen [full]."""
         number = np.arange(full.size) if chosen is None else np.flatnonzero(chosen)
         first, begin, length = _spans(full[number], number)
-        made = (lib.Span * max(first.size, 1))()
+        made = (lib.PlaceSpan * max(first.size, 1))()
         for k, span in enumerate(zip(first.tolist(), begin.tolist(), length.tolist(), strict=True)):
-            made[k] = lib.Span(*span)
+            made[k] = lib.PlaceSpan(*span)
         self._keep.append(made)
         return made, int(first.size)
 

@@ -11,10 +11,10 @@ from typing import Any
 
 import numpy as np
 from sysdyn.runtime.condense.composition import Composition, places_of
-from sysdyn.runtime.condense.condensed import Condensed, Room
+from sysdyn.runtime.condense.condensed import CondensedSystem, Room
 from sysdyn.runtime.condense.elimination import Elimination, definable, eliminate, steady
 from sysdyn.runtime.condense.settled_rows import settled_rows
-from sysdyn.runtime.condense.sums import Straights, Sums, sums
+from sysdyn.runtime.condense.sums import ConstantSums, Straights, sums
 from sysdyn.runtime.model.description import Floats
 from sysdyn.runtime.model.system import LARGE, System
 from sysdyn.runtime.numerics.least_change import least_norm
@@ -36,8 +36,8 @@ UNREAD = "leaves runs: nothing reads it"
 class Forms:
     """What an integration sees, and what its points are settled with."""
 
-    stepped: Condensed
-    settled: Condensed
+    stepped: CondensedSystem
+    settled: CondensedSystem
     room: Room
 
     def bind(self) -> None:
@@ -81,7 +81,7 @@ class _Condenser:
         self._allowed = np.zeros(0, dtype=bool)
         self._found: Elimination | None = None
         self._forms: Forms | None = None
-        self._numbers: Sums
+        self._numbers: ConstantSums
         self._terms: Composition
         self._straights: Straights
         self._last: tuple[Forms | None, bytes] | None = None
@@ -152,7 +152,7 @@ class _Condenser:
 
     def _make_forms(self, held: list[Any]) -> Forms | None:
         """The forms of an elimination and its sums, which are taken out of held: what they need no more goes."""
-        numbers: Sums = held.pop()
+        numbers: ConstantSums = held.pop()
         found: Elimination = held.pop()
         whole = self.whole
         rows = np.ones(whole.rows, dtype=bool)
@@ -178,7 +178,7 @@ class _Condenser:
         made = {}
         # the settled form first: of a large system its pattern is let go before the other's is made
         for system in (self.settled_system, whole):
-            form = made[system] = Condensed(system, numbers, terms, straights, rows_of.pop(system))
+            form = made[system] = CondensedSystem(system, numbers, terms, straights, rows_of.pop(system))
             form.renew(factors)
             if whole.unknowns > LARGE:
                 form.fix()

@@ -144,7 +144,7 @@ def definable(system: System, jy: Floats, constant: Floats, y: Floats) -> Mask:
 def eliminate(system: System, allowed: Mask) -> Elimination:
     """What can leave a form; allowed [entries]: `definable`."""
     gone = system.once("may leave", lambda: _candidates(system))[1]
-    return _Search(system, allowed).found(places_of(gone))
+    return _DefinitionSearch(system, allowed).found(places_of(gone))
 
 
 def _rank(system: System, family: int) -> int:
@@ -167,7 +167,7 @@ class _Span:
     families: frozenset[int]
 
 
-class _Search:
+class _DefinitionSearch:
     """Unknowns and the rows that define them, as far as they are found; reads[a]: families that define family a; read:
     families that define any.  No family is defined through itself.
 

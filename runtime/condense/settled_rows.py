@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 from sysdyn.runtime.condense.elimination import Mask
-from sysdyn.runtime.condense.sums import Sums
+from sysdyn.runtime.condense.sums import ConstantSums
 from sysdyn.runtime.model.description import Ints
 from sysdyn.runtime.model.patterns import Places, compress
 from sysdyn.runtime.model.system import System
@@ -28,7 +28,7 @@ def _defining(rows: Ints, columns: Ints) -> bool:
     return int((match_rows(pattern) >= 0).sum()) == own.size
 
 
-def settled_rows(stepped: System, settled: System, gone: Mask, numbers: Sums) -> Mask | None:
+def settled_rows(stepped: System, settled: System, gone: Mask, numbers: ConstantSums) -> Mask | None:
     """Rows of the settled form that are left [rows]; None where the others say more than what leaves moves by: what
     balances it would be open, or rates that observers read.
     """

@@ -21,7 +21,7 @@ LINE = np.dtype(lib.Straight)
 
 
 @dataclass(frozen=True, slots=True)
-class Sums:
+class ConstantSums:
     """e = c + T z of one set of numbers.  place, constant [eliminated]; start, source, factor: the terms of each, of
     unknowns kept or before it; kept: places of z; unread: of what is neither.
     """
@@ -39,17 +39,17 @@ class Sums:
         number, later = numbers_of(unknowns, self.kept), numbers_of(unknowns, self.place)
         return compose_definitions(self.start, number[self.source], later[self.source])
 
-    def places(self) -> Sums:
+    def places(self) -> ConstantSums:
         """What of it is no number, and no term: of a large system the room counts."""
         nothing, none = np.zeros(0, dtype=np.int32), np.zeros(0)
-        return Sums(self.place, none, nothing, nothing, none, self.kept, self.unread)
+        return ConstantSums(self.place, none, nothing, nothing, none, self.kept, self.unread)
 
-    def same(self, other: Sums) -> bool:
+    def same(self, other: ConstantSums) -> bool:
         """Whether the numbers are those of another one of the same structure, bit for bit."""
         return bool((self.factor == other.factor).all() and (self.constant == other.constant).all())
 
 
-def sums(system: System, found: Elimination, jy: Floats, constant: Floats) -> Sums:
+def sums(system: System, found: Elimination, jy: Floats, constant: Floats) -> ConstantSums:
     """The numbers of an elimination: jy [entries]; constant [rows]: the rows where all unknowns are zero."""
     # row: pivot e + rest + sum factor z = 0, solved for e
     pivot = jy[found.pivot]
@@ -60,7 +60,7 @@ def sums(system: System, found: Elimination, jy: Floats, constant: Floats) -> Su
     left[found.place] = left[found.unread] = False
     source = system.pattern.columns_of()[found.entry]
     kept = places_of(left)
-    return Sums(found.place, -rest / pivot, found.start, source, factor, kept, found.unread)
+    return ConstantSums(found.place, -rest / pivot, found.start, source, factor, kept, found.unread)
 
 
 def numbers_of(size: int, places: NDArray[np.integer]) -> Ints:
@@ -73,7 +73,7 @@ def numbers_of(size: int, places: NDArray[np.integer]) -> Ints:
 class Straights:
     """Stretches of eliminated unknowns whose terms read stretches, as the core has them: array, number."""
 
-    def __init__(self, found: Sums) -> None:
+    def __init__(self, found: ConstantSums) -> None:
         # places and numbers of terms that go on by one make a stretch
         count, number = np.diff(found.start), found.place.size
         same = np.diff(found.place) == 1
@@ -133,7 +133,7 @@ class Straights:
         unlike &= np.repeat(changes * LONG <= length, length)
         return np.union1d(begin, np.flatnonzero(unlike))
 
-    def renew(self, found: Sums) -> None:
+    def renew(self, found: ConstantSums) -> None:
         """Takes the numbers of other sums of the same structure."""
         self._factors[:] = found.factor[self._order]
         self._constants[:] = found.constant

@@ -14,12 +14,12 @@ from contextlib import contextmanager
 from dataclasses import replace
 
 import numpy as np
-from sysdyn.runtime.condense.condensed import Condensed
+from sysdyn.runtime.condense.condensed import CondensedSystem
 from sysdyn.runtime.condense.condenser import Forms, condense_model
 from sysdyn.runtime.events.plan import Happened
 from sysdyn.runtime.integrate.causes import NEWTON, failure, place_failure
 from sysdyn.runtime.integrate.creeping import Creeping, Windows
-from sysdyn.runtime.integrate.jumps.corners import Corners, serves
+from sysdyn.runtime.integrate.jumps.corners import CornerPassing, serves
 from sysdyn.runtime.integrate.jumps.crossing import cross
 from sysdyn.runtime.integrate.jumps.exchange import Exchange
 from sysdyn.runtime.integrate.jumps.pieces import Pieces
@@ -104,7 +104,7 @@ class Integration:
             self.driver.run.magnitude = lib.pointer(self.sizes.magnitude)
         self.pieces = Pieces(self, request.events) if request.events else None
         self.exchange = Exchange(self) if request.least_norm and system.description.switches.redundant else None
-        self.corners = Corners(self) if serves(self) else None
+        self.corners = CornerPassing(self) if serves(self) else None
         self._spare()
         self._put_away()
         if system.unknowns > LARGE:
@@ -202,7 +202,7 @@ class Integration:
         return found
 
     @property
-    def stepped(self) -> System | Condensed:
+    def stepped(self) -> System | CondensedSystem:
         """What the method sees."""
         return self.system if self.forms is None else self.forms.stepped
 

@@ -9,7 +9,7 @@ import ctypes as c
 from collections.abc import Callable
 from typing import Any
 
-from sysdyn.runtime.condense.condensed import Condensed
+from sysdyn.runtime.condense.condensed import CondensedSystem
 from sysdyn.runtime.integrate.factors import Factorisation, Factors
 from sysdyn.runtime.integrate.underlying import Underlying
 from sysdyn.runtime.model import core_library as lib
@@ -30,7 +30,7 @@ class Method:
     def __init__(
         self,
         name: str,
-        system: System | Condensed,
+        system: System | CondensedSystem,
         linear: Any,
         factors: Factors,
         order: Order,
@@ -65,7 +65,7 @@ class Method:
             raise MemoryError
         self._n = system.unknowns
         # a condensed form: full points by an expansion
-        if isinstance(system, Condensed):
+        if isinstance(system, CondensedSystem):
             self._n = system.whole.unknowns
             condensed = c.addressof(system.condensed)
             self.expanded = lib.core.sd_expanded_new(self.stepper, condensed, self._n)

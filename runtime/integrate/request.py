@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 from sysdyn.runtime import _core
 from sysdyn.runtime.events.plan import Happened, Plan
-from sysdyn.runtime.integrate.rows.ledgers import Balance, Ledgers
+from sysdyn.runtime.integrate.rows.ledgers import LedgerBalance, Ledgers
 from sysdyn.runtime.model import core_library as lib
 from sysdyn.runtime.model.description import Floats, Ints
 from sysdyn.values import dataclass
@@ -148,6 +148,6 @@ class Finished:
     open: dict[int, tuple[str, ...]] = field(default_factory=dict)
 
     @property
-    def balances(self) -> tuple[Balance, ...]:
+    def balances(self) -> tuple[LedgerBalance, ...]:
         """What came of each ledger."""
         return () if self.ledgers is None else self.ledgers.balances()

@@ -19,7 +19,7 @@ from sysdyn.runtime.events.contacts import Contacts
 from sysdyn.runtime.events.observer import Observer
 from sysdyn.runtime.events.pivoting import NoActiveSetError, Pivoting
 from sysdyn.runtime.events.plan import Plan, Sampled
-from sysdyn.runtime.linear.rest import SAME, SHARE, Equations, Rest, Resting
+from sysdyn.runtime.linear.rest import SAME, SHARE, Rest, RestEquations, Resting
 from sysdyn.runtime.model.description import Floats
 from sysdyn.runtime.model.system import System
 from sysdyn.runtime.numerics.gauss_newton import Problem
@@ -133,7 +133,7 @@ class ContactRest:
 class SampledRest:
     """Those of other equations that no sampled action changes; changes: what one would change, where it would."""
 
-    def __init__(self, equations: Equations, system: System, sampled: tuple[Sampled, ...]) -> None:
+    def __init__(self, equations: RestEquations, system: System, sampled: tuple[Sampled, ...]) -> None:
         self.equations, self.system, self.sampled = equations, system, sampled
         self.first, self.problem, self.is_apart = equations.first, equations.problem, equations.is_apart
         self.alike = equations.alike

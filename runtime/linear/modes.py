@@ -36,7 +36,7 @@ DEFECTIVE = 1e11
 
 
 @dataclass(frozen=True, slots=True)
-class Mode:
+class Eigenmode:
     """An eigenvalue (1/s): frequency |s| (rad/s), damping ratio -Re s/|s| (None at zero), participation [states];
     shape [states]: what moves, the largest one.
     """
@@ -74,7 +74,7 @@ def balance_matrix(a: Floats) -> tuple[Floats, Floats]:
     return np.asarray(found), np.asarray(scale)
 
 
-def modes(a: Floats, precisely: Decomposed | None = None) -> tuple[Mode, ...]:
+def modes(a: Floats, precisely: Decomposed | None = None) -> tuple[Eigenmode, ...]:
     """The modes of x' = a x, by rising real part, then imaginary part; precisely: of a in many digits."""
     # a model without states
     if not a.size:
@@ -95,7 +95,7 @@ def modes(a: Floats, precisely: Decomposed | None = None) -> tuple[Mode, ...]:
     return _sort_modes(values, share / share.sum(axis=0), scale[:, None] * right)
 
 
-def _sort_modes(values: Complexes, share: Floats, right: Complexes) -> tuple[Mode, ...]:
+def _sort_modes(values: Complexes, share: Floats, right: Complexes) -> tuple[Eigenmode, ...]:
     order = sorted(range(values.size), key=lambda k: (round(float(values[k].real), 12), float(values[k].imag)))
     return tuple(_mode(complex(values[k]), share[:, k], right[:, k]) for k in order)
 
@@ -132,15 +132,15 @@ def _resolve_eigenvalues(values: Complexes, a: Floats) -> Complexes:
     return np.where(np.abs(values) > least, values, 0.0)
 
 
-def _mode(value: complex, share: Floats, right: Complexes) -> Mode:
+def _mode(value: complex, share: Floats, right: Complexes) -> Eigenmode:
     # the shape in units of its largest component
     size = abs(value)
     largest = right[int(np.argmax(np.abs(right)))]
     shape = np.asarray(right / largest if largest != 0.0 else right, dtype=np.complex128)
-    return Mode(value, size, 0.0 - value.real / size if size > 0.0 else None, share, shape)
+    return Eigenmode(value, size, 0.0 - value.real / size if size > 0.0 else None, share, shape)
 
 
-def store_shares(modes_: Sequence[Mode], content: Floats, conjugate: Floats) -> Floats:
+def store_shares(modes_: Sequence[Eigenmode], content: Floats, conjugate: Floats) -> Floats:
     """Shares [modes, stores] of each mode's energy: |Re(content* conjugate)| of q, e or p, f [stores, states], normed.
 
     Of an oscillation twice the mean over a period, of a decay the energy itself, relative to the whole.

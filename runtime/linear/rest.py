@@ -368,7 +368,7 @@ class Resting:
         return False
 
 
-class Equations(Protocol):
+class RestEquations(Protocol):
     """What states of rest are found of: Resting, or with constraints that hold at times contact_rest.ContactRest."""
 
     first: Floats
@@ -392,7 +392,7 @@ class Equations(Protocol):
 
 
 def rests(
-    resting: Equations, tries: int, most: int | None = None, advance: Callable[[int], None] | None = None
+    resting: RestEquations, tries: int, most: int | None = None, advance: Callable[[int], None] | None = None
 ) -> tuple[Rest, ...]:
     """States of rest from the first guess and from random points (up to MANY unknowns), in the order found; most: how
     many are wanted; advance: told how many points were tried.

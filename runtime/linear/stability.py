@@ -14,7 +14,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 from sysdyn.runtime import tuning
-from sysdyn.runtime.linear.modes import Mode, balance_matrix, modes
+from sysdyn.runtime.linear.modes import Eigenmode, balance_matrix, modes
 from sysdyn.runtime.linear.tangent import Reduced
 from sysdyn.runtime.model.description import Floats
 from sysdyn.runtime.model.system import System
@@ -30,7 +30,7 @@ FLAT = tuning.SAME
 
 
 @dataclass(frozen=True, slots=True)
-class Energy:
+class EnergyTest:
     """kind: minimum, maximum, saddle or flat; stiffness: eigenvalues of K on unit virtual displacements, rising;
     conservative: no dissipation and no gyroscopic effort.
     """
@@ -41,16 +41,16 @@ class Energy:
 
 
 @dataclass(frozen=True, slots=True)
-class Verdict:
+class StabilityVerdict:
     """stability: asymptotically stable, stable, unstable or undecided; by: linearisation or energy."""
 
     stability: str
     by: str
-    modes: tuple[Mode, ...]
-    energy: Energy | None
+    modes: tuple[Eigenmode, ...]
+    energy: EnergyTest | None
 
 
-def verdict(small: Reduced, loose: NDArray[np.bool_], energy: Energy | None, together: int = 0) -> Verdict:
+def verdict(small: Reduced, loose: NDArray[np.bool_], energy: EnergyTest | None, together: int = 0) -> StabilityVerdict:
     """What both methods say together; loose [unknowns]: what nothing depends on; together: directions in which
     displacements move without changing anything: so many eigenvalues at zero say nothing.
     """
@@ -64,21 +64,21 @@ def verdict(small: Reduced, loose: NDArray[np.bool_], energy: Energy | None, tog
     found = modes(small.a, small.decomposed)
     # Lyapunov: one in the right half plane
     if (values.real > near).any():
-        return Verdict("unstable", "linearisation", found, energy)
+        return StabilityVerdict("unstable", "linearisation", found, energy)
     # all in the left half plane
     if (values.real < -near).all():
-        return Verdict("asymptotically stable", "linearisation", found, energy)
+        return StabilityVerdict("asymptotically stable", "linearisation", found, energy)
     # eigenvalues on the axis: the potential decides (Lagrange, Dirichlet)
     if energy is not None and energy.kind == "minimum":
-        return Verdict("stable", "energy", found, energy)
+        return StabilityVerdict("stable", "energy", found, energy)
     # no minimum and nothing dissipates: unstable (Chetayev)
     if energy is not None and energy.kind in ("maximum", "saddle") and energy.conservative:
-        return Verdict("unstable", "energy", found, energy)
+        return StabilityVerdict("unstable", "energy", found, energy)
     # on the axis, and the energy says nothing
-    return Verdict("undecided", "linearisation", found, energy)
+    return StabilityVerdict("undecided", "linearisation", found, energy)
 
 
-def energy_at(system: System, state: ConsistentState) -> Energy | None:
+def energy_at(system: System, state: ConsistentState) -> EnergyTest | None:
     """The energy test at a state of rest; None where it says nothing: steady motion, efforts that effort constraints or
     dynamic variables give, or that have no potential.  system: the form as written of a primal formulation.
     """
@@ -111,7 +111,7 @@ def energy_at(system: System, state: ConsistentState) -> Energy | None:
     if not np.isfinite(stiff).all() or np.abs(stiff - stiff.T).max() > FLAT * size or active:
         return None
     values: Floats = np.asarray(np.linalg.eigvalsh((stiff + stiff.T) / 2.0), dtype=np.float64)
-    return Energy(_kind(values), tuple(map(float, values)), not turning and not np.abs(loss).any())
+    return EnergyTest(_kind(values), tuple(map(float, values)), not turning and not np.abs(loss).any())
 
 
 def _kind(values: Floats) -> str:

@@ -110,7 +110,7 @@ class Wide:
 
 
 @dataclass(frozen=True, slots=True)
-class Rows:
+class LinearisedRows:
     """The rows of the start at a state: jacobian [rows, unknowns and rates], which rows hold, which rates are read."""
 
     starter: Starter
@@ -125,7 +125,7 @@ class Given:
     depends on.
     """
 
-    rows: Rows
+    rows: LinearisedRows
     system: System
     state: ConsistentState
     by_input: tuple[Floats, ...]
@@ -139,7 +139,7 @@ class Given:
         return np.asarray(found[rows])
 
 
-def rows_at(system: System, state: ConsistentState) -> Rows:
+def rows_at(system: System, state: ConsistentState) -> LinearisedRows:
     """Every row that holds at consistent states, linearised; system: the form as written."""
     starter = Starter(system)
     x = starter.unknowns(state.t, state.y, state.yd)
@@ -154,7 +154,7 @@ def rows_at(system: System, state: ConsistentState) -> Rows:
         raise NoLinearisation("the slopes of the equations are no numbers there")
     # rates of displacements are flows: no unknowns of their own
     as_written = np.delete(full, np.s_[system.form.written : starter.n], axis=1)
-    return Rows(starter, as_written, starter.every & ~starter.groups("initial"))
+    return LinearisedRows(starter, as_written, starter.every & ~starter.groups("initial"))
 
 
 def _tangent(g: Floats, by_column: Floats) -> tuple[Floats, Floats]:

@@ -37,7 +37,7 @@ from sysdyn.runtime.simulate import close
 from sysdyn.runtime.start.settled import HELD, Settler
 from sysdyn.runtime.start.start import ConsistentState
 from sysdyn.runtime.structure.rates import determined_rates
-from sysdyn.runtime.trace.keeping import Held
+from sysdyn.runtime.trace.keeping import HeldWriter
 from sysdyn.runtime.trace.trace import Trace, TraceParameter
 
 MOST = 48
@@ -443,7 +443,7 @@ class Batch:
         )
         # the rows of the last run are still there
         rows = made.driver.rows[: core.held]
-        writer = Held(replace(runs.layout(made.method.contents.rtol, None), parameters=parameters))
+        writer = HeldWriter(replace(runs.layout(made.method.contents.rtol, None), parameters=parameters))
         writer.append(rows[(rows[:, 1].astype(np.int32) & TRACE) > 0])
         runs.done = finished, [], writer
         estimate = float(found.estimate[0])

@@ -15,7 +15,7 @@ CAPPED: int = _core.SD_CAPPED
 """How proposals of a row are taken (core/start/magnitudes.h)."""
 
 
-class Balance:
+class RowBalance:
     """rows, columns [entries] of a matrix [rows, unknowns]; kind [unknowns]: number of the kind and unit of each.
 
     Depends on the structure alone and changes never: several threads may read it.

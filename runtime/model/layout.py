@@ -12,7 +12,7 @@ from sysdyn.values import dataclass
 
 
 @dataclass(frozen=True, slots=True)
-class Layout:
+class JacobianLayout:
     """What of a form depends on the structure alone.  slots: of each part of the matrix in the pattern; entries: of the
     largest part; may_hold: rows, unknowns, slots, switches (-1: always) of the rows that may read "multiplier = 0",
     reads_rate: which of them read its rate.
@@ -25,7 +25,7 @@ class Layout:
     reads_rate: Ints
 
 
-def laid_out(description: Description, form: Form, left_out: LeftOut) -> Layout:
+def laid_out(description: Description, form: Form, left_out: LeftOut) -> JacobianLayout:
     """Pattern and slots of a form without these constraints."""
     # rows q' - f, then the entries of each block
     parts = [Places(form.k_row, form.k_q), Places(form.k_row, form.k_f)]
@@ -43,7 +43,7 @@ def laid_out(description: Description, form: Form, left_out: LeftOut) -> Layout:
     place = np.concatenate([np.full(held[0].size, -1), times[2]])
     reads_rate = np.concatenate([np.zeros(held[0].size), times[3]]).astype(np.int32)
     at_times = last.row.astype(np.int32), last.column.astype(np.int32), slots[-1].copy(), place
-    return Layout(pattern, tuple(slots), max([*sizes, 1]), at_times, reads_rate)
+    return JacobianLayout(pattern, tuple(slots), max([*sizes, 1]), at_times, reads_rate)
 
 
 def entries_of(description: Description, call: Planned) -> tuple[Places, Places]:

@@ -24,7 +24,7 @@ import numpy as np
 from numpy.typing import NDArray
 from sysdyn.runtime import tuning
 from sysdyn.runtime.model import core_library as lib
-from sysdyn.runtime.model.balance import Balance
+from sysdyn.runtime.model.balance import RowBalance
 from sysdyn.runtime.model.description import Floats, Ints
 from sysdyn.runtime.model.inertia import own_places, with_flows
 from sysdyn.runtime.model.patterns import Pattern, read_only
@@ -106,10 +106,10 @@ def _kinds(system: System) -> Ints:
     return found
 
 
-def balance(system: System) -> Balance:
+def balance(system: System) -> RowBalance:
     """The rows of a system's Jacobian."""
     pattern = system.pattern
-    return system.once("balance", lambda: Balance(system.rows, pattern.row, pattern.columns_of(), alike(system)))
+    return system.once("balance", lambda: RowBalance(system.rows, pattern.row, pattern.columns_of(), alike(system)))
 
 
 def _rows_of_displacements(system: System) -> tuple[NDArray[np.int64], NDArray[np.int64]]:

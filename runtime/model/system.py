@@ -19,7 +19,7 @@ from sysdyn.runtime.model.description import BASE, Description, Floats, Ints, de
 from sysdyn.runtime.model.facts import Facts, Found, Mask
 from sysdyn.runtime.model.forms import Form, plan
 from sysdyn.runtime.model.held_rows import LeftOut
-from sysdyn.runtime.model.layout import Layout, laid_out
+from sysdyn.runtime.model.layout import JacobianLayout, laid_out
 from sysdyn.runtime.model.patterns import Pattern, read_only, spared_loops
 
 LARGE = 100_000
@@ -102,7 +102,7 @@ class System(Facts):
     def _make(self, description: Description, carrier: Carrier, index_form: str, left_out: LeftOut = ()) -> None:
         self._plan(description, carrier, index_form, left_out)
         self._own: dict[Hashable, Any] = {}
-        self._layout: Layout | None = None
+        self._layout: JacobianLayout | None = None
         self._slots: list[Ints] = []
         self.trim()
         self._assemble()
@@ -144,7 +144,7 @@ class System(Facts):
 
     # --- the core's structure -------------------------------------------------------------------------------
 
-    def _laid_out(self) -> Layout:
+    def _laid_out(self) -> JacobianLayout:
         """Pattern and slots of the form, found once a description."""
         key = self._layout_key
         if key not in self.description.layouts:
@@ -200,7 +200,7 @@ class System(Facts):
         self.switch()
         self.description.switches.join(self)
 
-    def _bring_back(self) -> Layout:
+    def _bring_back(self) -> JacobianLayout:
         """The layout and all that points there."""
         layout = self._layout = self._laid_out()
         self._slots, self._away = list(layout.slots), False

@@ -10,7 +10,7 @@ import ctypes as c
 import numpy as np
 from numpy.typing import NDArray
 from sysdyn.runtime.model import core_library as lib
-from sysdyn.runtime.model.balance import Balance
+from sysdyn.runtime.model.balance import RowBalance
 from sysdyn.runtime.model.description import Ints, Places
 from sysdyn.runtime.model.inertia import flows_joined, own_unknown, with_flows
 from sysdyn.runtime.model.redirected import redirect_entries
@@ -179,7 +179,7 @@ class Equations:
     def core(self, system: System, settled: System) -> lib.RowsOfStart:
         """The core's structure for the rows of one settled system."""
         form, found = system.form, lib.RowsOfStart()
-        balance = Balance(settled.rows, self.rows, self.columns, self.alike)
+        balance = RowBalance(settled.rows, self.rows, self.columns, self.alike)
         found.system, found.balance, found.extended = c.addressof(settled.core), balance.core, settled.form.extended
         found.written, found.rates = self.n, self.rates.size
         found.plain, found.rated, found.k_spans = self.plain, self.rated, len(form.k_span)

@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 from sysdyn.runtime import _core, tuning
-from sysdyn.runtime.condense.condensed import Condensed
+from sysdyn.runtime.condense.condensed import CondensedSystem
 from sysdyn.runtime.condense.elimination import affine
 from sysdyn.runtime.condense.sums import numbers_of
 from sysdyn.runtime.model import core_library as lib
@@ -164,7 +164,7 @@ class Settler:
         magnitude: Floats,
         time_scale: float,
         state: NDArray[np.bool_],
-        condensed: Condensed | None = None,
+        condensed: CondensedSystem | None = None,
         common: Ints | None = None,
     ) -> None:
         self.system, self._points = settled, settled.unknowns
@@ -268,7 +268,7 @@ class Settler:
         def own() -> Ints:
             """Rows that tell what follows from the state."""
             unknowns, rates = own_rows(self.system), own_rows_of_rates(self.system)
-            if not isinstance(self._left, Condensed):
+            if not isinstance(self._left, CondensedSystem):
                 return np.concatenate([unknowns, rates[self.rates]])
             kept = self._left.kept
             row = np.append(numbers_of(self.system.rows, self._left.kept_rows), -1).astype(np.int32)
@@ -341,7 +341,7 @@ class Settler:
 
     def left_of(self, mask: NDArray[np.bool_]) -> NDArray[np.bool_]:
         """Of a mask of the settled rows those that are left where some unknowns follow from others."""
-        return mask[self._left.kept_rows] if isinstance(self._left, Condensed) else mask
+        return mask[self._left.kept_rows] if isinstance(self._left, CondensedSystem) else mask
 
     @property
     def address(self) -> int:

@@ -20,7 +20,7 @@ import numpy as np
 from numpy.typing import NDArray
 from sysdyn.runtime import tuning
 from sysdyn.runtime.model import core_library as lib
-from sysdyn.runtime.model.balance import Balance
+from sysdyn.runtime.model.balance import RowBalance
 from sysdyn.runtime.model.description import START, Floats, Initial, Ints, Places, statements
 from sysdyn.runtime.model.failures import InconsistentStart, RowLabel
 from sysdyn.runtime.model.inertia import Inertia, own_unknown
@@ -145,7 +145,7 @@ class Starter:
         """The rows and their entries, sums of rows among them."""
         if not self.summed:
             return self.core.balance  # type: ignore[no-any-return]
-        self._own_balance = Balance(self.settled.rows, self.rows, self.columns, self.equations.alike)
+        self._own_balance = RowBalance(self.settled.rows, self.rows, self.columns, self.equations.alike)
         return self._own_balance.core
 
     @functools.cached_property

@@ -54,7 +54,7 @@ class Writer(Protocol):
         """Closes without more ado."""
 
 
-class Held:
+class HeldWriter:
     """A trace that is written in memory; `trace` once it is finished."""
 
     def __init__(self, layout: Layout) -> None:
@@ -127,7 +127,7 @@ class Held:
         self.closed, self._rows = True, []
 
 
-class Memory:
+class MemoryKeeping:
     """Runs that keep their rows in memory."""
 
     path: Path | None = None
@@ -137,9 +137,9 @@ class Memory:
         """Nobody else can see it."""
         yield
 
-    def writer(self, layout: Layout, first: bool) -> Held:
+    def writer(self, layout: Layout, first: bool) -> HeldWriter:
         """Of the next run."""
-        return Held(layout)
+        return HeldWriter(layout)
 
     def take(self, writer: Writer, before: Writer) -> None:
         """A finished run takes the place of the one before it."""
@@ -193,9 +193,9 @@ class Files:
             writer.path.unlink()
 
 
-Keeping = Files | Memory
+Keeping = Files | MemoryKeeping
 
 
 def keeping(output: str | Path | None) -> Keeping:
     """In memory where there is no path."""
-    return Memory() if output is None else Files(output)
+    return MemoryKeeping() if output is None else Files(output)

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from sysdyn.runtime.accuracy.control import CHANCES, TAME, WORTH, control
 from sysdyn.runtime.accuracy.laws import LAWS, STEEP, law_of
-from sysdyn.runtime.accuracy.pairs import ROUND_OFF, Sampled, difference, left_at_rest
+from sysdyn.runtime.accuracy.pairs import ROUND_OFF, RunSample, difference, left_at_rest
 from sysdyn.runtime.integrate.request import LONGEST
 from sysdyn.runtime.model.failures import SolverFailure
 
@@ -16,7 +16,7 @@ LAW = LAWS["bdf"]
 def sampled(tolerance, values, steps=None):
     values = np.asarray(values, dtype=np.float64).reshape(-1, 1)
     steps = round(1.0 / tolerance) if steps is None else steps
-    return Sampled(tolerance, values, np.abs(values).max(axis=0), steps)
+    return RunSample(tolerance, values, np.abs(values).max(axis=0), steps)
 
 
 @pytest.mark.long
@@ -132,7 +132,7 @@ def test_errors_are_taken_in_the_sizes_of_the_finer_run():
     def run(tolerance, longest):
         exploded = tolerance > 1e-7
         found = sampled(tolerance, [1.0, 0.5 + tolerance])
-        return Sampled(tolerance, found.values, found.largest * (1e16 if exploded else 1.0), found.steps)
+        return RunSample(tolerance, found.values, found.largest * (1e16 if exploded else 1.0), found.steps)
 
     achieved = control(run, np.array([1e-6]), LAW)
     assert achieved.met
@@ -182,8 +182,8 @@ def test_a_run_that_was_thrown_off_does_not_say_what_round_off_is(noise, apart):
     nothing in both runs, told as an error of 0 and met.
     """
     largest = np.array([4852.0 if noise > 1.0 else 3.7])
-    coarse = Sampled(1e-4, np.array([[1.0], [3.7]]), np.array([3.7]), steps=229, noise=np.array([4e-10]))
-    fine = Sampled(1e-6, np.array([[1.0], [3.7 * 0.99]]), largest, steps=8148, noise=np.array([noise]))
+    coarse = RunSample(1e-4, np.array([[1.0], [3.7]]), np.array([3.7]), steps=229, noise=np.array([4e-10]))
+    fine = RunSample(1e-6, np.array([[1.0], [3.7 * 0.99]]), largest, steps=8148, noise=np.array([noise]))
     assert difference(coarse, fine, np.array([1e-2]))[0] == pytest.approx(apart / 3.7)
 
 
@@ -207,7 +207,7 @@ def test_what_only_one_run_did_between_the_instants_is_not_believed():
 
     def run(tolerance, longest):
         value = np.array([[1.0], [0.5 + tolerance]])
-        return Sampled(tolerance, value, np.array([next(peaks)]), steps=100)
+        return RunSample(tolerance, value, np.array([next(peaks)]), steps=100)
 
     achieved = control(run, np.array([1e-2]), LAWS["dopri"])
     assert achieved.met
@@ -216,7 +216,7 @@ def test_what_only_one_run_did_between_the_instants_is_not_believed():
 
 def test_what_both_runs_did_between_the_instants_is_believed():
     def run(tolerance, longest):
-        return Sampled(tolerance, np.array([[1.0], [0.5 + tolerance]]), np.array([1e6 + 1e4 * tolerance]), steps=100)
+        return RunSample(tolerance, np.array([[1.0], [0.5 + tolerance]]), np.array([1e6 + 1e4 * tolerance]), steps=100)
 
     achieved = control(run, np.array([1e-2]), LAWS["dopri"])
     assert achieved.met
@@ -298,5 +298,5 @@ def test_short_runs_on_steep_laws_are_not_believed_to_fall_fast():
 )
 @pytest.mark.one_in(3)
 def test_what_is_left_where_a_quantity_comes_to_rest_is_error(coarse, fine, left):
-    one, two = (Sampled(1e-3, np.array(values)[:, None], np.ones(1), 100) for values in (coarse, fine))
+    one, two = (RunSample(1e-3, np.array(values)[:, None], np.ones(1), 100) for values in (coarse, fine))
     assert left_at_rest(one, two, np.array([1e-3])) == pytest.approx((1e-3 * left, left))

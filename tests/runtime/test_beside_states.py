@@ -8,7 +8,7 @@ import pytest
 import small_models as models
 from sysdyn.runtime.events.locate import Edges, crossing
 from sysdyn.runtime.linear.pencil import motions, reduce_pencil, surely_parted, widely_parted
-from sysdyn.runtime.linear.stability import Energy, energy_at, verdict
+from sysdyn.runtime.linear.stability import EnergyTest, energy_at, verdict
 from sysdyn.runtime.linear.states import pivots, rank_of, unseen
 from sysdyn.runtime.linear.tangent import NoLinearisation, Reduced
 from sysdyn.runtime.model.carrier import load
@@ -164,7 +164,7 @@ def test_states_are_the_rows_farthest_from_each_other():
     np.testing.assert_allclose(np.array([0.6, 0.8, 0.0]) @ left, 0.0, atol=1e-15)
 
 
-MINIMUM, SADDLE = Energy("minimum", (1.0,), True), Energy("saddle", (-1.0, 1.0), True)
+MINIMUM, SADDLE = EnergyTest("minimum", (1.0,), True), EnergyTest("saddle", (-1.0, 1.0), True)
 
 
 @pytest.mark.parametrize(
@@ -176,7 +176,7 @@ MINIMUM, SADDLE = Energy("minimum", (1.0,), True), Energy("saddle", (-1.0, 1.0),
         (1.0, 0.0, MINIMUM, ("stable", "energy")),
         (1.0, 0.0, None, ("undecided", "linearisation")),
         (0.0, 0.0, SADDLE, ("unstable", "energy")),
-        (0.0, 0.0, Energy("saddle", (-1.0, 1.0), False), ("undecided", "linearisation")),
+        (0.0, 0.0, EnergyTest("saddle", (-1.0, 1.0), False), ("undecided", "linearisation")),
     ],
 )
 @pytest.mark.one_in(5)

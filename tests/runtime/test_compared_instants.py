@@ -7,9 +7,9 @@ import pytest
 from sysdyn.runtime.accuracy import fronts
 from sysdyn.runtime.accuracy.common_instants import MANY, MOST, Thinned, common, join_instants, known_instants, late_by
 from sysdyn.runtime.accuracy.options import Options, WrongOption, instants
-from sysdyn.runtime.accuracy.pairs import Sampled, difference, distance_of_runs
+from sysdyn.runtime.accuracy.pairs import RunSample, difference, distance_of_runs
 from sysdyn.runtime.integrate.request import COMPARED, TRACE
-from sysdyn.runtime.integrate.rows.ledgers import Balance
+from sysdyn.runtime.integrate.rows.ledgers import LedgerBalance
 from sysdyn.runtime.integrate.weights.round_off import LeftOpen
 from sysdyn.runtime.integrate.weights.unknown_roles import Roles, without_rate
 from sysdyn.runtime.judgement import Estimate, allowed_share, cancelling_quantities, judge
@@ -119,7 +119,7 @@ SPRING = RowLabel("spring.q", "observe", "m.sd", 3)
 
 
 def balance(value, turnover=2.0, kind="energy", passed=1.0, risen=()):
-    return Balance(kind, "energy", "J", passed, turnover, value, SPRING, risen)
+    return LedgerBalance(kind, "energy", "J", passed, turnover, value, SPRING, risen)
 
 
 def test_what_a_balance_may_be_follows_from_the_accuracy():
@@ -179,8 +179,8 @@ def test_what_an_event_is_late_by_counts_where_values_move():
     late = late_by(np.array([0.2, 0.4, 0.9]), np.array([0.3995]), np.array([0.4005]), 1.0)[:, None]
     assert late[:, 0] == pytest.approx([0.0, 1e-3, 0.0])
     moved = np.where(late > 0.0, late * np.array([[2.0, 0.0]]), np.inf)
-    coarse = Sampled(1e-4, np.array([[0.0, 0.0], [1.0, 0.0], [3.0, 1.0]]), np.ones(2), 10)
-    fine = Sampled(1e-6, np.array([[0.0, 0.0], [1.0009, 1.0], [3.0, 1.0]]), np.ones(2), 20, between=moved)
+    coarse = RunSample(1e-4, np.array([[0.0, 0.0], [1.0, 0.0], [3.0, 1.0]]), np.ones(2), 10)
+    fine = RunSample(1e-6, np.array([[0.0, 0.0], [1.0009, 1.0], [3.0, 1.0]]), np.ones(2), 20, between=moved)
     assert distance_of_runs(coarse, fine)[1] == pytest.approx([9e-4, 0.0])
     assert difference(coarse, fine, np.full(2, 1e-3)) == pytest.approx((9e-4, 0.9))
     turned = replace(fine, values=fine.values + np.array([[0.0], [0.05], [0.0]]), jump=np.array([0.0, 1.0]))

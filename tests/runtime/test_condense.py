@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from sysdyn.runtime.condense.composition import compose_definitions
 from sysdyn.runtime.condense.elimination import Elimination
-from sysdyn.runtime.condense.sums import Straights, Sums, numbers_of, sums
+from sysdyn.runtime.condense.sums import ConstantSums, Straights, numbers_of, sums
 
 
 @pytest.mark.parametrize("seed", range(4))
@@ -42,7 +42,7 @@ def test_no_sums_at_all():
 
 def numbers(factor):
     """e0 = 1 + 2 z0, e1 = 3 e0 - z1 of the unknowns (z0, e0, z1, e1), with the factor in place of 3."""
-    return Sums(
+    return ConstantSums(
         place=np.array([1, 3]),
         constant=np.array([1.0, 0.0]),
         start=np.array([0, 1, 3]),

@@ -5,7 +5,7 @@ import pytest
 from scipy.sparse import coo_array, csc_array, diags_array, eye_array, kron
 from scipy.sparse.csgraph import maximum_bipartite_matching
 from sysdyn.runtime.model import core_library as lib
-from sysdyn.runtime.model.balance import Balance
+from sysdyn.runtime.model.balance import RowBalance
 from sysdyn.runtime.model.patterns import Pattern
 from sysdyn.runtime.numerics import ordering, rank
 from sysdyn.runtime.numerics.matching import match_rows
@@ -254,7 +254,7 @@ def test_rows_that_are_peeled_are_independent():
 
 def test_magnitudes_balance_their_rows():
     """u = R i and i = C u' with u = 5: the current is 5/R, and behind it what the second row makes of that."""
-    balance = Balance(2, np.array([0, 0, 1, 1]), np.array([0, 1, 1, 2]), np.array([0, 1, 2]))
+    balance = RowBalance(2, np.array([0, 0, 1, 1]), np.array([0, 1, 1, 2]), np.array([0, 1, 2]))
     size = np.array([1.0, 100.0, 1.0, 1e-3])
     found = balance.propagate(np.array([5.0, 0.0, 0.0]), size, np.zeros(2))
     assert found == pytest.approx([5.0, 0.05, 50.0])

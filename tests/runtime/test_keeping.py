@@ -7,7 +7,7 @@ import h5py
 import numpy as np
 import pytest
 from sysdyn.runtime.model import core_library as lib
-from sysdyn.runtime.trace.keeping import Files, Memory, keeping
+from sysdyn.runtime.trace.keeping import Files, MemoryKeeping, keeping
 from sysdyn.runtime.trace.trace import Trace, TraceError
 from sysdyn.runtime.trace.trace_store import BEFORE, Column, Layout, TraceParameter, clear, input_output
 
@@ -52,7 +52,7 @@ def test_a_run_is_what_was_written_in_memory_as_in_a_file(path, tmp_path):
 
 
 def test_a_run_in_memory_is_let_go():
-    kept = Memory()
+    kept = MemoryKeeping()
     one, two = written(kept, [0.0, 1.0]), written(kept, [0.0, 2.0], first=False)
     kept.take(two, one)
     assert one.closed

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 import small_models as models
 from sysdyn.runtime.condense.settled_rows import settled_rows
-from sysdyn.runtime.condense.sums import Sums
+from sysdyn.runtime.condense.sums import ConstantSums
 from sysdyn.runtime.model.carrier import load
 from sysdyn.runtime.model.system import System
 
@@ -19,7 +19,7 @@ def without(system, name, row):
     place = np.array([system.unknown_names.index(name)])
     gone = np.array([system.row_label(k).label == row for k in range(system.rows)])
     one = np.zeros(1)
-    numbers = Sums(place, one, np.array([0, 0]), empty, np.zeros(0), np.zeros(0, dtype=np.int32), empty)
+    numbers = ConstantSums(place, one, np.array([0, 0]), empty, np.zeros(0), np.zeros(0, dtype=np.int32), empty)
     kept = settled_rows(system, settled, gone, numbers)
     if kept is None:
         return None

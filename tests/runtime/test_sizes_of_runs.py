@@ -7,9 +7,9 @@ import pytest
 import small_models as models
 from sysdyn.runtime.accuracy import accounts
 from sysdyn.runtime.accuracy.accounts import Accounts
-from sysdyn.runtime.accuracy.compared import Compared
+from sysdyn.runtime.accuracy.compared import RunComparison
 from sysdyn.runtime.accuracy.options import Options
-from sysdyn.runtime.accuracy.pairs import Sampled
+from sysdyn.runtime.accuracy.pairs import RunSample
 from sysdyn.runtime.accuracy.quantities import Quantities
 from sysdyn.runtime.integrate.request import Finished, Statistics
 from sysdyn.runtime.integrate.weights.sizes import Sizes
@@ -88,9 +88,9 @@ def test_what_a_method_of_fewer_unknowns_meets_is_shared():
 
 def compared(coarse, fine, **more):
     """What differs most of runs at 0, 1, 2 s of two quantities of which 1e-3 and 1e-2 are asked."""
-    of = Compared(Options(None, 0.0, 2.0), SimpleNamespace(), 2)
+    of = RunComparison(Options(None, 0.0, 2.0), SimpleNamespace(), 2)
     of.samplings = tuple(
-        Sampled(tolerance, np.array(values), np.array([1.0, 10.0]), 5, **more)
+        RunSample(tolerance, np.array(values), np.array([1.0, 10.0]), 5, **more)
         for tolerance, values in ((1e-3, coarse), (1e-4, fine))
     )
     of._at = np.array([0.0, 1.0, 2.0])

@@ -5,7 +5,7 @@ import pytest
 import small_models as models
 from sysdyn.runtime.integrate.factors import Factors
 from sysdyn.runtime.integrate.methods import Method
-from sysdyn.runtime.integrate.rows.least_norm import LeastNorm
+from sysdyn.runtime.integrate.rows.least_norm import LeastMultipliers
 from sysdyn.runtime.integrate.weights.metric import kinematic_scale
 from sysdyn.runtime.integrate.weights.round_off import left_open
 from sysdyn.runtime.integrate.weights.unknown_roles import roles
@@ -96,7 +96,7 @@ def test_the_least_multipliers_of_a_row_written_twice_share_its_force():
     settled = system("settled", phi={**ROD, "again": "2*(q_1**2 + q_2**2 - 25)"})
     written = settled.another("3")
     y, yd = point(written, q_1=3.0, q_2=-4.0, kappa_rod=7.0), np.zeros(written.unknowns)
-    found = LeastNorm(settled).apply(0.0, y, yd)
+    found = LeastMultipliers(settled).apply(0.0, y, yd)
     kappa = [found[written.unknown_names.index(name)] for name in ("kappa_rod", "kappa_again")]
     assert kappa == pytest.approx([7.0 / 5.0, 14.0 / 5.0])
     assert settled.residual(0.0, found, yd)[settled.of_groups("dynamics")] == pytest.approx(

@@ -38,7 +38,7 @@ def test_ctypes_structures_have_the_compilers_layout(tmp_path):
     pairs += [("Rosenbrock", "sd_rosenbrock")]
     pairs += [("Balance", "sd_balance"), ("Sizing", "sd_sizing"), ("Order", "sd_order")]
     pairs += [("RowsOfStart", "sd_rows_of_start"), ("Search", "sd_search")]
-    pairs += [("Condensed", "sd_condensed"), ("Expanded", "sd_expanded"), ("Span", "sd_span")]
+    pairs += [("Condensed", "sd_condensed"), ("Expanded", "sd_expanded"), ("PlaceSpan", "sd_span")]
     pairs += [("Straight", "sd_straight"), ("Left", "sd_left"), ("Lines", "sd_lines"), ("Shares", "sd_shares")]
     pairs += [("RadauMethod", "sd_radau_method")]
     pairs += [("Watch", "sd_watch"), ("Collocation", "sd_collocation")]

@@ -26,7 +26,7 @@ def serves(run: Integration) -> bool:
     return whole and run.driver.impulses is None
 
 
-class Corners:
+class CornerPassing:
     """The core's structure for one run."""
 
     def __init__(self, run: Integration) -> None:

@@ -22,7 +22,7 @@ from sysdyn.runtime.events.plan import Assignment, Happened, Plan
 from sysdyn.runtime.events.watches import Watched
 from sysdyn.runtime.integrate.jumps.crossing import JUMP
 from sysdyn.runtime.integrate.jumps.segments import core_pieces
-from sysdyn.runtime.integrate.jumps.strikes import Balance, of_momenta, struck
+from sysdyn.runtime.integrate.jumps.strikes import ImpulseBalance, of_momenta, struck
 from sysdyn.runtime.model import core_library as lib
 from sysdyn.runtime.model.scales import ROUND_OFF, UNKNOWN
 from sysdyn.runtime.start.restart import STILL
@@ -58,7 +58,7 @@ JUMPS: int = _core.SD_JUMP
 
 
 @dataclass(frozen=True, slots=True)
-class Told:
+class TransitionEntries:
     """What a transition is called: name, element, what is said (before and after alike, but for numbers), which numbers
     of each entry that assigns; the other entries as they were.
     """
@@ -75,7 +75,7 @@ class Told:
         return found + [Happened(t, e.name, e.element, e.before, e.after) for e in self.entries]
 
 
-def told_of(groups: Sequence[tuple[Assignment, ...]], entries: Sequence[Happened]) -> Told:
+def told_of(groups: Sequence[tuple[Assignment, ...]], entries: Sequence[Happened]) -> TransitionEntries:
     """What a transition is called of which these are the entries; groups: assignments of the first of them."""
     # assigned values are filled in from the core's log
     assigns, k = [], 0
@@ -84,7 +84,7 @@ def told_of(groups: Sequence[tuple[Assignment, ...]], entries: Sequence[Happened
         end = k + 2 * len(group)
         assigns.append((entry.name, entry.element, said, slice(k, end, 2), slice(k + 1, end, 2)))
         k = end
-    return Told(tuple(assigns), tuple(entries[len(assigns) :]))
+    return TransitionEntries(tuple(assigns), tuple(entries[len(assigns) :]))
 
 
 def serves(plan: Plan, run: Integration) -> bool:
@@ -102,7 +102,7 @@ def _equal(condition: tuple[Any, ...], plan: Plan) -> bool:
     return any(_equal(item, plan) for item in condition[1:])
 
 
-class Modes:
+class EventModes:
     """Modes and transitions of one run."""
 
     def __init__(self, run: Integration, handler: Handler, longest: float) -> None:
@@ -110,9 +110,9 @@ class Modes:
         self._keep: list[Any] = []
         self._number: dict[Any, int] = {}
         self._states: list[Any] = []
-        self._told: list[Told] = []
+        self._told: list[TransitionEntries] = []
         self._tried: dict[str, int] = {}
-        self._strikes: dict[int, Balance | None] = {}
+        self._strikes: dict[int, ImpulseBalance | None] = {}
         self._modes, self._transitions = (lib.Mode * 8)(), (lib.Transition * 16)()
         # systems whose rows change with the set
         settled = [run.system, run.settler.system, *([run.projection.system] if run.projection else [])]

@@ -20,7 +20,7 @@ from sysdyn.runtime.events.watches import Watched
 from sysdyn.runtime.integrate.causes import failure
 from sysdyn.runtime.integrate.jumps.crossing import go_on
 from sysdyn.runtime.integrate.jumps.first_step import PARTS, FirstStep
-from sysdyn.runtime.integrate.jumps.modes import UNSEEN, Modes, serves
+from sysdyn.runtime.integrate.jumps.modes import UNSEEN, EventModes, serves
 from sysdyn.runtime.integrate.jumps.segments import Segment
 from sysdyn.runtime.integrate.request import TRACE
 from sysdyn.runtime.integrate.rows.driver import Sink
@@ -76,7 +76,7 @@ class Pieces:
         if plan.sampled and not start.sampled:
             run.driver.note(start.t, *before)
         self._first(self.handler.begin(start.t, *before, sampled=start.sampled))
-        self.modes = Modes(run, self.handler, self._longest) if serves(plan, run) else None
+        self.modes = EventModes(run, self.handler, self._longest) if serves(plan, run) else None
         if self.modes is not None:
             # the core's own state of passing a peak
             self._passing = self.modes.core

@@ -27,7 +27,7 @@ MOST = 60
 Mask = NDArray[np.bool_]
 
 
-def struck(handler: Handler, k: int, t: float, y: Floats, yd: Floats) -> Balance | None:
+def struck(handler: Handler, k: int, t: float, y: Floats, yd: Floats) -> ImpulseBalance | None:
     """The impulse of contact k, of what it reaches, as at a point; None where the core cannot tell it."""
     assert handler.restart is not None
     system, contact = handler.restart.settler.system, handler.plan.contacts[k]
@@ -51,7 +51,7 @@ def struck(handler: Handler, k: int, t: float, y: Floats, yd: Floats) -> Balance
         # only the part of the model that the impulse reaches
         place, over = handler.contacts.multiplier, system.of_groups("dynamics")
         part, rows = _connected_part(system, (behind, over), (system.are("f", "p", "e"), acts), place[k])
-        found = Balance(system, (t, y, yd), (behind, over), (part & ~acts, part & acts))
+        found = ImpulseBalance(system, (t, y, yd), (behind, over), (part & ~acts, part & acts))
         # other gaps in that part must not be pushed together
         pushed = np.unique(system.pattern.columns_of()[(rows & over)[system.pattern.row]])
         gaps = np.flatnonzero([c.kind == "phi" for c in handler.plan.contacts])
@@ -66,7 +66,7 @@ def struck(handler: Handler, k: int, t: float, y: Floats, yd: Floats) -> Balance
 def _connected_part(
     system: System, rows: tuple[Mask, Mask], unknowns: tuple[Mask, Mask], multiplier: int
 ) -> tuple[Mask, Mask]:
-    """Unknowns and rows [unknowns], [rows] of the connected part of a multiplier in the equations of `Balance`."""
+    """Unknowns and rows [unknowns], [rows] of the connected part of a multiplier in the equations of `ImpulseBalance`."""
     (behind, over), (moves, acts) = rows, unknowns
     row, column, (in_y, in_rate) = system.pattern.row, system.pattern.columns_of(), system.structural()
     # rows behind the impact by what moves, balances by what acts
@@ -80,15 +80,15 @@ def _connected_part(
     return part & (moves | acts), there
 
 
-def of_momenta(system: System, t: float, y: Floats, yd: Floats) -> Balance | None:
+def of_momenta(system: System, t: float, y: Floats, yd: Floats) -> ImpulseBalance | None:
     """How momenta follow from flows; None where their rows leave some open."""
     none = np.zeros(system.unknowns, dtype=bool)
     rows = system.of_groups("momentum"), np.zeros(system.rows, dtype=bool)
-    found = Balance(system, (t, y, yd), rows, (system.are("p"), none))
+    found = ImpulseBalance(system, (t, y, yd), rows, (system.are("p"), none))
     return found if found.ready else None
 
 
-class Balance:
+class ImpulseBalance:
     """Equations of unknowns that move and impulses that act, laid out for the core; it frees what it made.
 
     at: t, y, yd; rows: behind the instant, integrated over it [rows]; unknowns: those that move, those with impulses
@@ -126,7 +126,7 @@ class Balance:
             self._keep.append(np.ascontiguousarray(gaps, dtype=np.int32))
             self.core.besides, self.core.beside = gaps.size, lib.pointer(self._keep[-1])
 
-    def of_gap(self, k: int, row: int, multiplier: int, restitution: float) -> Balance | None:
+    def of_gap(self, k: int, row: int, multiplier: int, restitution: float) -> ImpulseBalance | None:
         """The balance with the impulse of contact k: its row of flows, the place of its multiplier; None where that
         has no impulse.
         """

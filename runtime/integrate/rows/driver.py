@@ -12,7 +12,7 @@ from sysdyn.runtime.integrate.jumps.impulses import Impulses, Side
 from sysdyn.runtime.integrate.methods import Method
 from sysdyn.runtime.integrate.request import TRACE, Request
 from sysdyn.runtime.integrate.rows.bare import OBSERVED, by_sums, shows
-from sysdyn.runtime.integrate.rows.least_norm import LeastNorm
+from sysdyn.runtime.integrate.rows.least_norm import LeastMultipliers
 from sysdyn.runtime.integrate.rows.ledgers import Ledgers
 from sysdyn.runtime.model import core_library as lib
 from sysdyn.runtime.model.description import Floats, Ints
@@ -89,7 +89,7 @@ class Driver:
         run = self.run = self.core.contents
         run.ledgers = self.ledgers.address
         # least multipliers of redundant constraints
-        self._least_norm = LeastNorm(settler.system) if request.least_norm else None
+        self._least_norm = LeastMultipliers(settler.system) if request.least_norm else None
         if self._least_norm is not None:
             run.least_norm = self._least_norm.address
         self._observers(start_rate)

@@ -13,7 +13,7 @@ from sysdyn.runtime.model.system import System
 from sysdyn.runtime.numerics.ordering import column_order
 
 
-class LeastNorm:
+class LeastMultipliers:
     """settled: the System in form "settled", in whose rows of dynamics the reactions stand."""
 
     def __init__(self, settled: System) -> None:

@@ -22,7 +22,7 @@ ROWS: int = _core.SD_LEDGER_ROWS
 
 
 @dataclass(frozen=True, slots=True)
-class Balance:
+class LedgerBalance:
     """A ledger over a run.
 
     kind: energy or invariant; title: what is kept; unit: of value and turnover; passed: what elements were supplied
@@ -51,7 +51,7 @@ class Balance:
         return next((t for t, value in self.risen if not value <= limit), None)
 
 
-def turned_over(balances: Iterable[Balance]) -> float:
+def turned_over(balances: Iterable[LedgerBalance]) -> float:
     """The energy [J] that went through all parts of a model: what an error of `audit.energy` is relative to."""
     return sum(b.turnover for b in balances if b.kind == "energy" and b.unit == "J")
 
@@ -135,7 +135,7 @@ class Ledgers:
         self._arrays |= {"most": nothing, "value": nothing, "before": nothing}
         self._inertia = np.zeros(0, dtype=np.int8)
 
-    def balances(self) -> tuple[Balance, ...]:
+    def balances(self) -> tuple[LedgerBalance, ...]:
         """What came of each ledger."""
         # instants at which a ledger rose above all before
         records = c.cast(self.core.record, c.POINTER(lib.Record))
@@ -145,7 +145,7 @@ class Ledgers:
             risen[record.ledger].append((record.t, record.value))
         return tuple(self._balance(k, *found) for k, found in enumerate(zip(self.stored, risen, strict=True)))
 
-    def _balance(self, k: int, stored: float, records: list[tuple[float, float]]) -> Balance:
+    def _balance(self, k: int, stored: float, records: list[tuple[float, float]]) -> LedgerBalance:
         label, unit, first = self._heads[k]
         kind, _, title = label.partition(": ")
         # passed and stored: what the balance is relative to
@@ -156,7 +156,7 @@ class Ledgers:
         highest = max((v for _, v in records), default=0.0) if math.isfinite(value) else math.inf
         element = self._label(int(self._element[k])) if self._element[k] >= 0 else first
         risen = tuple((t, v if math.isfinite(v) else math.inf) for t, v in records)
-        return Balance(kind, title, unit, passed, turnover, highest, element, risen)
+        return LedgerBalance(kind, title, unit, passed, turnover, highest, element, risen)
 
     def __del__(self) -> None:
         if getattr(self, "core", None) is not None:

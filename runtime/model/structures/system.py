@@ -94,7 +94,7 @@ class Left(c.Structure):
     _fields_ = [("residual", P), ("jacobian", P), ("steep", P)]
 
 
-class Span(c.Structure):
+class PlaceSpan(c.Structure):
     """sd_span."""
 
     _fields_ = [("full", I), ("kept", I), ("number", I)]
