@@ -66,7 +66,7 @@ def struck(handler: Handler, k: int, t: float, y: Floats, yd: Floats) -> Impulse
 def _connected_part(
     system: System, rows: tuple[Mask, Mask], unknowns: tuple[Mask, Mask], multiplier: int
 ) -> tuple[Mask, Mask]:
-    """Unknowns and rows [unknowns], [rows] of the connected part of a multiplier in the equations of `ImpulseBalance`."""
+    """Unknowns and rows of the connected part of a multiplier in the equations of `ImpulseBalance`."""
     (behind, over), (moves, acts) = rows, unknowns
     row, column, (in_y, in_rate) = system.pattern.row, system.pattern.columns_of(), system.structural()
     # rows behind the impact by what moves, balances by what acts
