@@ -480,6 +480,9 @@ class Handler(Watching):
     # -- what never ends -----------------------------------------------------------------------------------------
 
     def _count(self, t: float) -> None:
+        """Counts events at one instant; SolverFailure where instants accumulate, or events or those of an instant are
+        too many.
+        """
         near = t - self.last <= self.nothing
         self.stalled, self.last = (self.stalled + 1 if near else 0), t
         # instants that shrink towards a limit

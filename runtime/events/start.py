@@ -62,9 +62,12 @@ def eventful_start(system: System, t0: float, plan: Plan, budget: Budget | None 
 
 
 def _sampled_start(system: System, t0: float, plan: Plan, budget: Budget) -> ConsistentState:
+    """The start with the active set that fits, behind samples due at t0 where these are wanted."""
     begun: Standing | None = None
+    # one budget for all sets
     if plan.contacts:
         budget = budget.part(SETS)
+    # samples may turn what holds: the text's numbers are needed again
     if plan.sampled and any(c.kind == "guarded" for c in plan.contacts):
         system.own_numbers()
         begun = _standing(system)
@@ -72,6 +75,7 @@ def _sampled_start(system: System, t0: float, plan: Plan, budget: Budget) -> Con
     try:
         found = _integrated(system, t0, plan, budget)
     except InconsistentStart:
+        # no samples that could help
         if begun is None:
             raise
     if begun is None or (found is not None and found.kept):
@@ -96,6 +100,7 @@ def _behind_samples(
     y, yd = (found.y, found.yd) if found is not None else (np.zeros(system.form.written),) * 2
     behind: tuple[ConsistentState, Standing, Floats] | None = None
     try:
+        # until samples assign what they did before
         for _ in range(SAMPLES):
             handler.back(begun)
             places = handler.assign_samples(t0, y, yd)
@@ -105,6 +110,7 @@ def _behind_samples(
                 return replace(behind[0], sampled=True)
             # where samples assign nothing, for the word why there is none
             state = _integrated(system, t0, plan, budget)
+            # they assign nothing, or the start behind them is farther off
             if not places or (found is not None and not state.kept):
                 break
             behind = state, handler.now(), assigned
@@ -112,6 +118,7 @@ def _behind_samples(
     except InconsistentStart as error:
         failed = error
     except SolverFailure as failure:
+        # time is up: no further search
         if failure.cause == "max_wall":
             raise
     handler.back(stood)
@@ -121,7 +128,7 @@ def _behind_samples(
 
 
 def _integrated(system: System, t0: float, plan: Plan, budget: Budget) -> ConsistentState:
-    """The same, whatever samples do.
+    """The start with the active set that fits, whatever samples do.
 
     Constants of integrated constraints are what follows from the start: such a constraint is its own integral, whatever
     it is there, and the complementary forms have none.  Active sets that contradict themselves have no start, which
@@ -131,6 +138,7 @@ def _integrated(system: System, t0: float, plan: Plan, budget: Budget) -> Consis
     constants = bool(system.description.constants)
     if constants:
         system.own_numbers()  # they are written there
+    # without contacts: one start
     if not plan.contacts:
         return consistent_start(system, t0, budget=budget, constants=constants)
     with suppress(InconsistentStart):
@@ -148,9 +156,11 @@ def _pivoted(system: System, t0: float, plan: Plan, budget: Budget, *, quickly: 
     """
     starts = _Starts(system, t0, plan, budget, quickly=quickly)
     try:
+        # near guesses of stores first
         return starts.nearest(starts.fitted(starts.held()))
     except NoActiveSetError as error:
         failed = starts.failure(error)
+    # between two sets that ask for each other
     for asked in starts.found[: -1 - BETWEEN : -1] if quickly else ():
         with suppress(NoActiveSetError):
             return starts.fitted(near=asked)
@@ -181,6 +191,7 @@ class _Starts:
 
     def _sought_near(self, near: ConsistentState | None) -> None:
         """What stores are guessed to hold from now on; None: as the text says."""
+        # starts known so far are near another point
         if near is not self._near:
             self._near = near
             self._known.clear()
@@ -201,11 +212,13 @@ class _Starts:
                 jumped=jumped,
             )
         except InconsistentStart as error:
+            # only real starts explain why there is none
             if jumped is None:
                 self.errors.append(error)
             return None
 
     def _settle(self, t: float, y: Floats, yd: Floats) -> tuple[Floats, Floats, Floats] | None:
+        """The consistent point of the present set at t, remembered, and no impulses; None: there is none."""
         which = t, self.contacts.state()
         if which not in self._known:
             self._known[which] = self._started(t), self.contacts.system.description.p[self._constants]
@@ -229,6 +242,7 @@ class _Starts:
         magnitude, time = magnitudes(system, t, t + 1.0, y, yd)
         here = np.zeros(magnitude.size)
         here[: y.size] = np.abs(y)
+        # of each group the largest
         here = largest_of_group(alike(system), here)
         self.contacts.size(np.minimum(magnitude, here / FAINT, out=magnitude, where=here > 0.0), time)
 
@@ -240,16 +254,19 @@ class _Starts:
         self._begin()
         contacts = self.contacts
         free = [k for k, c in enumerate(contacts.contacts) if c.kind == "psi" and not contacts.barred[k]]
+        # no one-way flow that may turn, or too large
         if not free or contacts.system.unknowns > DENSE:
             return None
         state = self._begun([contacts.contacts[k].number for k in free])
         constants = contacts.system.description.p[self._constants]
+        # stores would move: with all of them holding instead
         if state is None or not state.kept:
             contacts.active[free] = True
             contacts.apply()
             other = self._begun()
             if other is not None and (state is None or state.farther(other)):
                 state, constants = other, contacts.system.description.p[self._constants]
+        # neither has a start
         if state is None:
             return None
         self._held, self._of_held = state, constants
@@ -281,6 +298,7 @@ class _Starts:
         """
         self._sought_near(near)
         determined = Determined(self.contacts)
+        # no step tells a set that fits: from the begin
         if held is None or not self._behind_steps(determined.pivoting, held):
             self._begin()
         else:
@@ -288,9 +306,10 @@ class _Starts:
         return self._fitting(determined)
 
     def _fitting(self, determined: Determined | None = None) -> ConsistentState:
-        """The same from the present set."""
+        """The state whose set fits, sought from the present set."""
         contacts, determined = self.contacts, determined or Determined(self.contacts)
         y, yd = determined.fit(self._t, self._zeros, self._zeros, self._settle)
+        # a diode that may hold or not: what fits later decides
         if _tied(contacts, contacts.observer(self._t, y, yd)):
             y = _ahead(contacts, determined, self._t, self._settle, y)
         last = next(k for k in reversed(range(len(self.found))) if self.found[k].y is y)
@@ -304,6 +323,7 @@ class _Starts:
         """
         contacts, t, zeros = self.contacts, self._t, self._zeros
         ways = [k for k, c in enumerate(contacts.contacts) if c.kind in HOLD and not contacts.barred[k]]
+        # nothing moved, or nothing may stand otherwise
         if found.kept or not found.far or not ways:
             return found
         best = found, contacts.state(), contacts.system.description.p[self._constants]
@@ -311,10 +331,12 @@ class _Starts:
         self._begin()
         contacts.active[ways] = True
         contacts.apply()
+        # from where everything holds
         with suppress(NoActiveSetError):
             other = self._fitting()
             if found.farther(other):
                 best = other, contacts.state(), contacts.system.description.p[self._constants]
+        # then one after the other turned
         for k in ways if len(ways) <= BESIDE else ():
             contacts.become(best[1])
             contacts.flip(k, contacts.observer(t, best[0].y, best[0].yd))
@@ -334,8 +356,10 @@ class _Starts:
         known, time = contacts.observer.largest.copy(), max(contacts.time, LEAST)
         parts = SHORT if self._quickly else SHORT[:1]  # it takes long to be sure that a set has no start
         told = dict[float, tuple[Floats, tuple[float, ...], Floats]]()  # point, set and sizes behind each step
+        # stores as guessed, then as impulses leave them
         for jumps, part in itertools.product((False, True), parts):
             h = part * time
+            # the set behind a step of this length, once
             if not jumps and (point := self._behind(pivoting, held, h, SHORT[-1] * time)) is not None:
                 told[h] = point, contacts.state(), contacts.observer.largest.copy()
             if h not in told:
@@ -344,6 +368,7 @@ class _Starts:
             contacts.become(state)
             self._sought_near(self._jumped(pivoting, held, behind, 0.5 * h) if jumps else None)
             pivoting.ahead(t, behind, h)  # impulses are over then
+            # the set behind it fits
             if self._nearly_fits(kept=not jumps):
                 return True
             contacts.observer.largest[:] = known
@@ -357,6 +382,7 @@ class _Starts:
         self._begin()
         self._put(self._of_held)
         behind = pivoting.ahead(self._t, held, h, self._t)
+        # begun with the set behind a longer step
         if behind is None and h < longest and self._behind(pivoting, held, LONGER * h, longest) is not None:
             behind = pivoting.ahead(self._t, held, h, self._t)
         return behind
@@ -368,11 +394,13 @@ class _Starts:
         assert found is not None  # it fits
         values, zero = contacts.observer(t, *found[:2]), contacts.observer.zero
         for k, c in enumerate(contacts.contacts):
+            # contacts that hold something are not freed
             if c.kind != "psi" or not contacts.active[k] or abs(values[c.multiplier]) > zero(c.multiplier):
                 continue
             before = contacts.state()
             contacts.flip(k, values)
             contacts.apply()
+            # open without it: does it fit free?
             if determined.nullity(t, *found[:2]) > 0:
                 free = self._settle(t, zeros, zeros)
                 if free is not None and contacts.fits(t, zeros, free):
@@ -392,6 +420,7 @@ class _Starts:
         stores no farther than to where they are held.
         """
         contacts, t, zeros = self.contacts, self._t, self._zeros
+        # a few turns are allowed
         for _ in range(TURNS):
             found = self._settle(t, zeros, zeros)
             if found is None or (kept and self._held is not None and self.found[-1].farther(self._held)):
@@ -418,6 +447,7 @@ def _ahead(contacts: Contacts, determined: Determined, t0: float, settle: Settle
     where none does.
     """
     stood, zeros, time = contacts.state(), np.zeros_like(y), contacts.time
+    # ever later, until a set fits that leaves nothing open
     for later in AHEAD:
         with suppress(NoActiveSetError):
             determined.fit(t0 + later * time, zeros, zeros, settle)

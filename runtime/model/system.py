@@ -451,6 +451,7 @@ class System(Facts):
         return found[: self.rows]
 
     def _evaluate(self, block: str, t: float, y: Floats, yd: Floats) -> Floats:
+        """Rows [observed] of a block of observers at a point (extended); zeros where the model has no such block."""
         call = self.observer(block)
         number = self.observed_rows(block)[1]
         # nothing observed

@@ -106,6 +106,7 @@ class Correction:
 
 def _numbered(places: Any, used: Mask) -> Any:
     """Places by their numbers among those in use."""
+    # all are in use
     if used.all():
         return places
     number = np.cumsum(used, dtype=np.int32)
@@ -136,6 +137,7 @@ class _Linear:
         taken = problem.use[problem.rows]
         taken &= problem.free[problem.columns]
         taken &= np.isfinite(values)
+        # every entry counts
         if taken.all():
             return values
         np.logical_not(taken, out=taken)
@@ -149,6 +151,7 @@ class _Linear:
         problem, size = self.problem, np.zeros(self.problem.number)
         values = self._slopes() if self._values is None else self._values
         add_sizes(problem.rows, problem.columns, values, problem.scale, size)
+        # rows without terms are as they are
         size[~(size > 0.0)] = 1.0
         return np.divide(1.0, size, out=size)
 
@@ -158,6 +161,7 @@ class _Linear:
         """
         problem, scaled = self.problem, np.multiply(r, self.row_scale, out=r)
         scaled[~problem.use] = 0.0
+        # rows that read nothing free: by all that they read
         perhaps = (scaled != 0.0) & (self.row_scale == 1.0)
         if perhaps.any():
             at = np.flatnonzero(perhaps[problem.rows])
@@ -179,6 +183,7 @@ class _Linear:
     def _taken(self, *, spent: bool = False) -> tuple[Any, Any, Floats]:
         """Rows, columns and values of the entries in use; factors would fill from zeros too.  spent: at last."""
         assert self._values is not None
+        # zeros would fill factors
         take = self._values != 0.0
         values = self._values[take]
         if spent:
@@ -189,6 +194,7 @@ class _Linear:
         """A by its entries, asked for once where a point does not hold: of a large one the room counts."""
         rows, columns, values = self._taken(spent=True)
         problem = self.problem
+        # scaled piece by piece, in place
         for here in pieces(values.size):
             values[here] *= problem.scale[columns[here]] / problem.weight[columns[here]]
             values[here] *= self.row_scale[rows[here]]
@@ -199,10 +205,13 @@ class _Linear:
         return rows, columns, values
 
     def determined(self, u: Floats, r: Floats, *, beside: bool) -> Floats | None:
-        """The same where the rows, as they are, determine the step (linear/dense/graded.h); None where they do not."""
+        """The u with A u = A u_now - r where the rows, as they are, determine the step (linear/dense/graded.h); None
+        where they do not.
+        """
         a, columns = self._full()
         step, stands = np.zeros(u.size), np.zeros(u.size, dtype=bool)
         stands[columns] = True
+        # rows that do not determine the step
         if graded(a, -r / self.row_scale[self.problem.use], step):
             return None
         return np.where(stands | beside, u + step / self.unit, 0.0)
@@ -218,12 +227,14 @@ class _Linear:
     def correction(self) -> Correction | None:
         """By how much the rows, as they are, miss what they determine; None where that is nothing."""
         problem, x, step, doubt = self.problem, self._x, np.zeros(self.shape[1]), np.zeros(self.shape[1])
+        # noise of each row: round-off of its terms
         noise = np.zeros(problem.number)
         add_sizes(problem.rows, problem.columns, problem.jacobian(x), np.abs(x), noise)
         noise *= _ROUNDINGS * np.finfo(float).eps
         aim = -problem.residual(x)[problem.use]
         failed = graded(self._full()[0], aim, step, noise[problem.use], doubt)
         doubt /= _ROUNDINGS
+        # singular, or no numbers
         if failed == 1 or not np.isfinite(step).all():
             return None
         found, open_ = x.copy(), np.zeros(x.size)
@@ -234,6 +245,7 @@ class _Linear:
     def nearest(self, x: Floats, r: Floats, *, beside: bool) -> Floats:
         """The least u with A u = A u_now - r at x; beside it, the least step: its round-off is its own.  r is spent."""
         levels = [level[self.problem.free] for level in self.problem.levels]
+        # the order of levels needs full matrices
         ordered = any(level.any() for level in levels) and max(self.shape) <= DENSE
         if not ordered and max(self.shape) <= SINGULAR_VALUES:
             only = self.determined(self.moved(x), r, beside=beside)
@@ -245,6 +257,7 @@ class _Linear:
         stays = u if beside else np.where(np.any(levels, axis=0), 0.0, u) if ordered else 0.0
         aim = add_product(*held[0], u - stays, np.negative(r, out=r))
         del r, u  # of a large one the room counts
+        # in order of levels, or least in all
         if ordered:
             return stays + in_order(self.shape, held.pop(), aim, levels)
         idle = None if self.problem.idle is None else self.problem.idle[self.problem.free]
@@ -253,6 +266,7 @@ class _Linear:
 
 def solve(problem: Problem, x: Floats, most: int = ITERATIONS) -> Solution:
     """From x towards the solution nearest to problem.guess; the best point met in so many iterations."""
+    # in the core, unless an order is asked for
     if problem.core is not None and not problem.levels:
         small = max(int(problem.use.sum()), int(problem.free.sum())) <= SMALL
         found = _in_core(problem, problem.core, x, most, measure=not small)
@@ -264,7 +278,7 @@ def solve(problem: Problem, x: Floats, most: int = ITERATIONS) -> Solution:
 
 
 def _in_core(problem: Problem, core: tuple[lib.RowsOfStart, float], x: Floats, most: int, *, measure: bool) -> Solution:
-    """The same of a small problem (core/start/search.h); measure: x as it is, of any."""
+    """The solution of a small problem by the core (core/start/search.h); measure: x as it is, of any."""
     found, scaled = np.ascontiguousarray(x) if measure else x.copy(), np.zeros(problem.number)
     use, free, work = problem.use.astype(np.int32), problem.free.astype(np.int32), problem.work
     masks = lib.pointer(use), lib.pointer(free)
@@ -272,6 +286,7 @@ def _in_core(problem: Problem, core: tuple[lib.RowsOfStart, float], x: Floats, m
     spent = work.allowed, work.spent, work.largest
     answers = lib.pointer(found), lib.pointer(scaled)
     search = lib.Search(c.addressof(core[0]), *masks, *numbers, core[1], most, *spent, *answers)
+    # no memory in the core
     if (lib.core.sd_search_measure if measure else lib.core.sd_search_solve)(c.byref(search)):
         raise MemoryError
     if problem.check is not None:
@@ -282,8 +297,10 @@ def _in_core(problem: Problem, core: tuple[lib.RowsOfStart, float], x: Floats, m
 
 
 def _solve(problem: Problem, x: Floats, most: int) -> Solution:
+    """Gauss-Newton from x in Python: linear rows met by the least change, steps halved until rows fall."""
     best = Solution(x, np.inf)
     stale, taken, lost = 0, 0, 0
+    # iterations, and a few more where rows shrink fast
     for _ in range(most + _FOLDS):
         if taken == most or lost == _LOST:
             break
@@ -299,6 +316,7 @@ def _solve(problem: Problem, x: Floats, most: int) -> Solution:
 
         # where it stands; it ends at round-off, or where nothing has become better for long
         size, scaled = measure(x)
+        # better than before: kept
         if size < best.residual:
             stale = stale if size > 0.5 * best.residual else 0
             best = Solution(x, size)
@@ -333,11 +351,13 @@ def _solve(problem: Problem, x: Floats, most: int) -> Solution:
             if np.isfinite(now) and now <= max((1.0 - 0.1 * step) * norm, 1e-11):
                 lost = 0
                 break
+            # ends of the way, by which it is judged
             if step >= 0.5:
                 ends = [*(ends or [measure(x)[1]]), there]
             if step == 0.5 and _ascends(*ends):
                 return best
             step *= 0.5
+        # no part of the way is better: a flat law, or lost
         else:
             flat = _flat(on, norm)
             lost = 0 if flat[0] < norm else lost + 1
@@ -356,6 +376,7 @@ def _ascends(begun: Floats, end: Floats, middle: Floats) -> bool:
     """Whether scaled rows are linear along a way on which they do not fall by a tenth: what is nearest to the solution
     of linear rows that contradict is all that there is.
     """
+    # not straight: another step may fall
     if norm_of(middle - 0.5 * (begun + end)) > STRAIGHT * norm_of(middle):
         return False
     return bool(np.einsum("i,i->", begun, end - 0.9 * begun) > 0.0)
@@ -366,6 +387,7 @@ def _flat(on: Callable[[float], tuple[Floats, Floats]], norm: float) -> tuple[fl
     exponent: that of a law that is flat (a junction that blocks, and shall conduct).
     """
     above, below = _HALVINGS, _FLATTEST
+    # between two powers of two, by their exponents
     while below - above > 1:
         halvings = (above + below) // 2
         above, below = (above, halvings) if norm_of(on(2.0**-halvings)[0]) <= norm else (halvings, below)
@@ -400,6 +422,7 @@ def least_residual(problem: Problem, x: Floats) -> Floats:
             return (problem.residual(z) * scale)[problem.use]
 
         r = measure(x)
+        # damped steps until rows fall
         for _ in range(ITERATIONS):
             linear = _Linear(problem, x)
             i, j, v = linear.entries()
@@ -411,6 +434,7 @@ def least_residual(problem: Problem, x: Floats) -> Floats:
                 tried = x.copy()
                 tried[problem.free] += step * linear.unit
                 now = measure(tried)
+                # nearer: less damping from here
                 if np.isfinite(now).all() and now @ now < r @ r:
                     break
                 damping *= 8.0

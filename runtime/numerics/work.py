@@ -80,6 +80,7 @@ class Work:
         """
         rows, unknowns = shape
         solution = FACTORS + 2e3 * (rows + unknowns + entries)
+        # singular values, a full matrix, or sparse factors
         if max(shape) <= SINGULAR_VALUES:
             solution = 15.0 * rows * unknowns * min(shape)
         elif full and max(shape) <= DENSE:

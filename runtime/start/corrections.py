@@ -38,6 +38,7 @@ def by_corrections(starter: Starter, t: float, x: Floats, rows: Mask, free: Mask
     """
     begun, nothing = x, np.zeros_like(free)
     last, rested = np.zeros(x.size), False
+    # corrections until nothing moves but round-off
     for k in range(SHARPER):
         problem = problem_of(starter, t, x, x, rows=rows, free=free)
         starter.work.iteration((int(rows.sum()), int(free.sum())), starter.rows.size)
@@ -46,7 +47,9 @@ def by_corrections(starter: Starter, t: float, x: Floats, rows: Mask, free: Mask
             return Corrected(begun, k == 0, nothing)
         step, size = near.x - x, np.maximum(problem.scale, np.abs(x))
         rests = not _moving(step, last, near.open_, size).any()
+        # at rest, and the rows agree: done
         if rests and (near.agrees or rested):
+            # what is less than its own round-off is zero
             if partly:
                 x = np.where(np.isfinite(near.open_) & (np.abs(x) <= near.open_), 0.0, x)
             holds = near.agrees and not leaves_open(starter, t, near, size)
@@ -73,6 +76,7 @@ def leaves_open(starter: Starter, t: float, near: Correction, size: Floats) -> b
     told, largest = starter.moves(*STATE, "e") & np.isfinite(near.open_), starter.largest_alike(size)
     if (near.open_ <= largest)[told].all():
         return False
+    # what rows add to it as it is, and momenta, may be as large as their terms
     slopes = np.abs(starter.jacobian(t, near.x))
     added = (slopes == 1.0) | (starter.groups("momentum")[starter.rows] & (slopes > 0.0))
     rows, columns = starter.rows[added], starter.columns[added]

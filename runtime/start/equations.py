@@ -49,9 +49,11 @@ class Equations:
         self.unsettled = inertial_rates(settled)
         self.unknowns = self.n + self.rates.size
         self.momentum, self.flow = with_flows(system)
+        # whether every flow has a balance: then contents are measured in momenta
         owners = {system.description.rows[family].owner for _, family, _ in system.form.groups}
         self.balanced = all(f.owner in owners for f in system.description.families if f.kind == "f")
         self._entries(settled)
+        # unknowns by which guessed expressions are missed
         misses = np.append(settled.are("slack", "unsaid"), np.zeros(self.rates.size, dtype=bool))[self.columns]
         self.guessed = self.rows[misses], self.columns[misses]
         self.told = self._told(settled)
@@ -83,6 +85,7 @@ class Equations:
         return np.flatnonzero(in_y).astype(np.int32), np.flatnonzero(in_rate & moving).astype(np.int32)
 
     def _kinds(self, settled: System, contents: Mask) -> None:
+        """The kind of each unknown, by which it is measured beside its like, and the kind of its family."""
         kinds = alike(settled)
         if contents.any():  # what chords hold is of the kind of coordinates
             families, numbers = settled.description.families, kinds_and_units(settled)
@@ -92,6 +95,7 @@ class Equations:
             kinds = kinds.copy()
             kinds[held] = of_q[settled.family_of[held]]
         self.alike = np.concatenate([kinds, kinds.max(initial=0) + 1 + kinds[self.rates]]).astype(np.int32)
+        # numbers of kinds alone, without units
         number: dict[str, int] = {}
         of_family = [number.setdefault(f.kind, len(number)) for f in settled.description.families]
         self.member = np.array([*of_family, 0], dtype=np.int32)[settled.family_of]
@@ -101,6 +105,7 @@ class Equations:
         """Dynamic variables that no row reads but those of block initial, one of which tells them [unknowns of y]."""
         plain, initial = self.columns < self.n, settled.of_groups("initial")
         row, column, telling = self.rows[plain], self.columns[plain], initial.copy()
+        # rows of block initial that guess nothing: they tell a value
         telling[self.guessed[0]] = False
         told, read = np.zeros((2, self.n), dtype=bool)
         told[column[telling[row]]] = read[column[~initial[row]]] = True
@@ -109,6 +114,7 @@ class Equations:
     @staticmethod
     def contents(settled: System) -> Mask:
         """Rows that guess contents of stores [rows]."""
+        # rows of block initial whose family is a content
         found = np.zeros(settled.rows, dtype=bool)
         for group, family, first in settled.form.groups:
             rows = settled.description.rows[family]
@@ -119,6 +125,7 @@ class Equations:
         """Unknowns of y that the contents of stores measure; a momentum with its flow."""
         mask = np.zeros(self.n, dtype=bool)
         own = contents[self.rows] & (self.columns < self.written)
+        # rows of contents that are made of flows
         row, column = self.rows[own], self.columns[own]
         flow, moving = settled.are("f")[column], np.zeros(settled.rows, dtype=bool)
         moving[row[flow]] = True  # what is made of flows measures these alone
@@ -130,17 +137,21 @@ class Equations:
         """Unknowns that are contents of the kind of momenta, and a flow with such a content each: dynamic variables
         that integrate efforts of a balance, what guesses of these miss and of contents made of flows.
         """
+        # the flow of which each row makes a content
         made = np.full(settled.rows, -1, dtype=np.int64)
         flows = np.flatnonzero(contents[self.rows] & np.append(settled.are("f"), self.rates < 0)[self.columns])
         made[self.rows[flows]] = self.columns[flows]
         row, column, (in_y, in_rate) = settled.pattern.row, settled.pattern.columns_of(), settled.structural()
         own, acts = own_unknown(settled, "dynamics", "f"), np.full(self.n, -1, dtype=np.int64)
+        # efforts that act on a coordinate's balance, and rates that read them
         effort, rates = in_y & settled.are("e")[column], settled.of_groups("lambda")
         told, read = np.flatnonzero(effort & (own >= 0)[row]), np.flatnonzero(effort & rates[row])
         acts[column[told]] = own[row[told]]
         made[row[read]] = acts[column[read]]
+        # dynamic variables whose rate is such an effort
         gains = np.flatnonzero(in_rate & rates[row] & settled.are("s")[column])
         rows, missed = self.guessed
+        # guesses of these count as the flow's
         if gains.size:
             of_gain = np.full(self.unknowns, -1, dtype=np.int64)
             of_gain[column[gains]] = made[row[gains]]
@@ -154,6 +165,7 @@ class Equations:
         the flows that make them.
         """
         rows, families = settled.description.rows, settled.description.families
+        # efforts by the units of their balances
         groups = settled.form.groups if self.balanced else ()
         effort = {rows[k].owner: rows[k].unit for group, k, _ in groups if group == "dynamics"}
         kinds = {"q": "", "s": "", "f": "p ", "p": "p ", "slack": "", "unsaid": ""}
@@ -166,6 +178,7 @@ class Equations:
         of_family = np.array([*(number.setdefault(s, len(number)) for s in names), 0], dtype=np.int32)
         of_y = of_family[settled.family_of]
         contents, flow = self.momenta
+        # contents of the kind of momenta share the measure of their flow
         of_y[contents] = of_y[flow]
         return np.append(of_y, np.full(self.rates.size, len(number), dtype=np.int32))
 
@@ -185,6 +198,7 @@ class Equations:
         found.plain, found.rated, found.k_spans = self.plain, self.rated, len(form.k_span)
         found.rate, found.k_span = map(lib.pointer, (self.rates, form.k_span))
         places = self._places(settled)
+        # of a large model entries go to places of their own at once
         if self.unknowns > LARGE and settled.plain:  # the room counts
             both = redirect_entries(settled, *self._numbered(settled, *places), self.plain + self.rated)
             found.both, entry = both.address, None

@@ -60,8 +60,10 @@ def off_the_flat(starter: Starter, t: float, x: Floats, follows: Mask) -> Iterat
     """
     beside = _beside(starter, t, x, follows)
     flat = flat_at(starter, t, x, follows)
+    # no law without slope
     if not flat.any():
         return
+    # the other rows hold first; flat laws that are missed then are begun beside
     flat_here = starter.columns_of(flat)
     rows = without_rates(starter) & ~starter.rows_of(flat)
     at = solve(problem_of(starter, t, x, x, rows=rows, free=follows & ~flat_here), x).x
@@ -70,6 +72,7 @@ def off_the_flat(starter: Starter, t: float, x: Floats, follows: Mask) -> Iterat
         missed = ~(np.abs(starter.residual(t, at)) * starter.row_scale(t, at, starter.scale(t, at)) <= OWN)
     some = starter.columns_of(flat & missed[starter.rows])
     yield np.where(some, beside, x) if some.any() else x, follows & (some | ~flat_here)
+    # all flat laws beside, where only some were
     if some.any() and (some != flat_here).any():
         yield np.where(flat_here, beside, x), follows
 
@@ -78,14 +81,17 @@ def beside_the_flat(starter: Starter, t: float, x: Floats, guess: Floats, rows: 
     """The point nearest to the guess on these rows but those without a slope at x in what follows from the state; what
     follows is beside it where these are missed; None where none is flat, or the others do not hold.
     """
+    # flat laws at rest in what follows
     follows = free & starter.following(t, x)
     x = rested(starter, t, x, follows)
     flat = rooted_at(starter, t, x, follows)
     flat &= rows[starter.rows]
+    # no law is flat on these rows
     if not flat.any():
         return None
     others = problem_of(starter, t, x, guess, rows=rows & ~starter.rows_of(flat), free=free, least=True)
     found = solve(others, guess)
+    # the others do not hold by themselves
     if found.residual >= OWN:
         return None
     near = starter.without_noise(found.x, starter.scale(t, x))  # what round-off left is no magnitude
@@ -96,6 +102,7 @@ def beside_the_flat(starter: Starter, t: float, x: Floats, guess: Floats, rows: 
 def _steep_at(starter: Starter, t: float, x: Floats, follows: Mask) -> Mask:
     """Entries [entries] of rows whose slope is beyond all bounds in what follows from the state, where that is zero."""
     at_zero: Mask = (follows & (x == 0.0))[starter.columns]
+    # nothing is zero: no law is steep at zero
     if not at_zero.any():
         return at_zero
     here, beside = (np.abs(starter.jacobian(t, at)) for at in (x, _beside(starter, t, x, follows)))
@@ -110,6 +117,7 @@ def bends(starter: Starter, t: float, x: Floats, follows: Mask) -> bool:
 
 def without_flow(starter: Starter, t: float, x: Floats, follows: Mask) -> Mask:
     """Of what follows the flows of laws without a slope at x whose rates are not asked for."""
+    # no row rests
     if not starter.resting.any():
         return np.zeros_like(follows)
     return starter.columns_of(flat_at(starter, t, x, follows) & starter.resting[starter.rows])
@@ -119,6 +127,7 @@ def at_rest(starter: Starter, t: float, x: Floats, follows: Mask) -> Mask:
     """Of what follows what stays as it is at x: these, and what is zero where laws have no slope in it, or one beyond
     all bounds, and hold.
     """
+    # flows of laws that rest, and what is zero where laws have no slope and hold
     still, at_zero = without_flow(starter, t, x, follows), follows & (x == 0.0)
     bent = (rooted_at(starter, t, x, follows) & at_zero[starter.columns]) | _steep_at(starter, t, x, follows)
     if not bent.any():
@@ -131,12 +140,15 @@ def rested(starter: Starter, t: float, x: Floats, follows: Mask) -> Floats:
     across them, and hold so to round-off.
     """
     size = _largest(starter, t, x)
+    # laws that are flat, then laws that are steep at zero
     for bent, most in ((rooted_at, HOLDS), (_steep_at, STEEPLY)):
         near = np.where(follows & (np.abs(x) <= NEXT_TO_NOTHING * size), 0.0, x)
+        # nothing is next to nothing
         if (near == x).all():
             break
         entries = bent(starter, t, near, follows)
         at = np.where(starter.columns_of(entries), near, x)
+        # only where the laws that read it hold so
         laws = starter.reading(at != x) & starter.rows_of(entries)
         x = at if (_missed(starter, t, at)[laws] <= most).all() else x
     return x
@@ -159,6 +171,7 @@ def unasked(starter: Starter, flat: Ints) -> bool:
     Where a law is flat, or infinitely steep, the flow that it determines grows as a root of time: the equations hold,
     and a rate of it there is none.
     """
+    # rates of these rows, by group and family
     rated = np.zeros_like(starter.every)
     first = _first_rows(starter)
     for group, family, row in starter.system.form.groups:
@@ -172,6 +185,7 @@ def unasked(starter: Starter, flat: Ints) -> bool:
 def _let_go(starter: Starter, rated: Mask) -> bool:
     """Asks for these rates of rows no more, which then are at rest; whether any were asked for."""
     before, first = int(starter.every.sum()), _first_rows(starter)
+    # a law and its rate: the law rests where its rate is let go
     for (group, family), row in first.items():
         own = slice(row, row + starter.system.description.rows[family].size)
         law = first.get((group.removesuffix("_rate"), family), row)
@@ -190,6 +204,7 @@ def unrated(starter: Starter, t: float, x: Floats) -> bool:
     """Asks for no rates of laws that have no slope at x, nor where rows of rates are no numbers there (an infinite
     slope times none); whether any were asked for.
     """
+    # rows of rates that are no number
     nothing = starter.every & ~np.isfinite(starter.residual(t, x)) & starter.groups(*HIDDEN)
     fewer = _let_go(starter, nothing)
     y, yd = starter.expand(x)

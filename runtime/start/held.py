@@ -54,22 +54,27 @@ def rescaled(
     in the magnitudes of the solution too.
     """
     at, best, idle = x if sized is None else sized, Solution(x, np.inf), 0
+    # magnitudes anew from what was found, until rows hold in them
     for k in range(RESCALINGS):
         if k and (starter.work.done or idle == IDLE):
             break
+        # switches may contradict: linear algebra tells before the search is long
         if k == _DOUBTED and not least and starter.system.description.switches.places and no_start(starter, t, x, free):
             break
         problem = problem_of(starter, t, at, guess, rows=starter.every, free=free, least=least)
         before, best = best.residual, solve(problem, best.x)
+        # the same residual again: idle
         idle = idle + 1 if abs(best.residual - before) <= SAME * before else 0
         if not np.isfinite(best.residual):
             break
         at = starter.without_noise(best.x, problem.scale)
         del problem  # of a large model the room counts
+        # held in the magnitudes of before: in its own too?
         if best.residual < EXACT:
             clean = next((c for c in (at, best.x) if own_residual(starter, t, at, c) < OWN), None)
             if clean is not None:
                 return replace(best, x=clean), True
+            # the guess where it was hardly left
             if x.size <= DENSE:
                 back = np.where(np.abs(best.x - guess) <= BACK * starter.scale(t, guess), guess, best.x)
                 if own_residual(starter, t, back, back) < OWN:
@@ -94,12 +99,15 @@ def least_change(
     """
     found = _settled(starter, t, x, guess, rows, free, state)
     at = x if found is None else found
+    # beside laws without slope too, in a small model
     beside = beside_the_flat(starter, t, at, guess, rows, free) if x.size <= DENSE else None
     if beside is None:
         return found
+    # what follows there, with the state held
     held = solve(problem_of(starter, t, beside, guess, rows=rows, free=free & ~state), beside)
     begun = held.x if held.residual < EXACT else beside  # else it may fall back to where laws are flat
     other = _settled(starter, t, begun, guess, rows, free, state)
+    # the nearer of both
     if found is None or (other is not None and not farther(starter, t, other, found, guess, free)):
         return other
     return found
@@ -115,7 +123,8 @@ def farther(starter: Starter, t: float, x: Floats, near: Floats, guess: Floats, 
 def _settled(
     starter: Starter, t: float, x: Floats, guess: Floats, rows: Mask, free: Mask, state: Mask
 ) -> Floats | None:
-    """The same by steps along the rows as they are linear."""
+    """The point of `least_change` by steps along the rows as they are linear; None where none was found."""
+    # by steps along linear rows until the state is as near as it gets
     for _ in range(_SETTLING):
         found = solve(problem_of(starter, t, x, guess, rows=rows, free=free, least=True), x)
         if found.residual >= EXACT:
@@ -156,6 +165,7 @@ def following(starter: Starter, t: float, x: Floats, guess: Floats, free: Mask, 
         ways = sorted(ways, key=lambda item: item[0] != starter.led)
     for k, (way, near) in ways:
         found, nearly = way(starter, t, near, guess, follows)
+        # nearly, and not by a root of round-off
         if nearly and (x.size > DENSE or way is _at_rest or (rested(starter, t, found.x, follows) == found.x).all()):
             starter.led = k
             return found, True
@@ -170,16 +180,19 @@ Way = tuple[Callable[..., tuple[Solution, bool]], Floats]
 
 def _ways(starter: Starter, t: float, x: Floats, free: Mask, follows: Mask) -> Iterator[Way]:
     """How what follows is sought, and from where."""
+    # of a large model: at once, then from beside flat laws
     if x.size > DENSE:
         yield _at_once, x
         yield from ((_at_once, near) for near, _ in off_the_flat(starter, t, x, follows))
         return
+    # points beside flat laws, and where it stands
     beside = [near for near, _ in off_the_flat(starter, t, x, follows)]
     points = [x, *(near for near in beside if (near != x).any())][::-1]
     rated = np.isfinite(starter.residual(t, x)[starter.every]).all()
     # where no state can move what is all but at rest has rates
     resting = not rated or (free & ~follows & ~starter.hollow).any()
     first = resting and (bool(beside) or not rated)
+    # at rest first where laws are flat, or rows are no numbers
     yield from ((_at_rest, near) for near in points if first)
     yield from ((_at_once, near) for near in points)
     if resting and not first:
@@ -196,10 +209,12 @@ def _at_rest(starter: Starter, t: float, x: Floats, guess: Floats, free: Mask) -
     at rest, as found; these are asked for again where that does not hold.
     """
     found = solve(problem_of(starter, t, x, guess, rows=without_rates(starter), free=free), x)
+    # rows as written do not hold
     if found.residual >= EXACT or x.size > DENSE:
         return found, False
     before, scale = (starter.every.copy(), starter.resting.copy()), starter.scale(t, guess)
     begun = starter.without_noise(found.x, scale)  # what round-off left is no magnitude
+    # rates of flat laws are let go until those that are left hold
     for still in (at_rest, without_flow):
         near, fewer = begun, True
         while fewer:
@@ -210,5 +225,6 @@ def _at_rest(starter: Starter, t: float, x: Floats, guess: Floats, free: Mask) -
             fewer = holds and unrated(starter, t, near)
         if holds:
             break
+        # asked for again: they do not hold without
         starter.every[:], starter.resting[:] = before
     return found, holds

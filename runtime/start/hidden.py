@@ -48,16 +48,20 @@ def hidden(entries: tuple[Places, Places, Floats], rows: Mask, answers: Mask, as
     None: there is none, or the rows are too many to look.
     """
     i, j, v = entries
+    # entries of what answers: flows and forces
     mine = rows[i] & answers[j] & (v != 0.0)
     (own, row), (other, column) = (np.unique(item[mine], return_inverse=True) for item in (i, j))
+    # nothing answers, or too many rows
     if not own.size or max(own.size, other.size) > DENSE:
         return None
     matrix = np.zeros((own.size, other.size))
     np.add.at(matrix, (row, column), v[mine])
     by_row, by_column = factors(matrix)
+    # sums of rows in which no answer is left
     found = null_space((by_row[:, None] * matrix * by_column).T).T
     weights = np.zeros((len(found), rows.size))
     weights[:, own] = np.where(np.abs(found) > BROKEN, found, 0.0) * by_row
+    # of these, sums in which something asked is left
     read = np.flatnonzero(asked[j] & (v != 0.0))
     left, terms = np.zeros((2, len(found), asked.size))
     for k, weight in enumerate(weights):

@@ -89,6 +89,7 @@ class Instant:
     def __init__(self, settled: System) -> None:
         self.system, kinds = settled, settled.kinds
         over = self._over = integrated(settled)
+        # which rows balance, which hold, which react
         self._row, self._column, self._moved = over.row, over.column, over.moved
         self._balances = settled.of_groups("dynamics")
         self._loose = self._without_displacement()
@@ -98,12 +99,14 @@ class Instant:
         self._states, self._constraints = settled.of_groups("momentum", "gamma"), settled.of_groups("phi_rate", "psi")
         self._moving = np.isin(kinds, ("f", "p", "e")) | over.contents
         self._told, self._struck = self._reacting()
+        # rows with and without inertia
         inertial, in_y, in_rate = inertial_rows(settled), over.in_y, over.in_rate
         self._light, self._heavy = settled.of_groups("dynamics", "psi", "gamma") & ~inertial, self._balances & inertial
         flow = (self._moved >= 0)[self._column]
         self._held = flow & in_rate & self._heavy[self._row], flow & in_y & settled.of_groups("momentum")[self._row]
         answered = inertial.copy()
         answered[self._row[in_rate | (in_y & flow)]] = True
+        # rows behind the instant that nothing answers by a pulse
         self._given = settled.of_groups("phi", "dynamics", "gamma") & ~answered
 
     def _without_displacement(self) -> Mask:
@@ -111,6 +114,7 @@ class Instant:
         at once is an integral of their own.
         """
         over = self._over
+        # flows with inertia
         inert = np.zeros(self.system.unknowns, dtype=bool)
         rates = over.in_rate & self._balances[self._row]
         inert[self._column[rates | self.system.of_groups("momentum")[self._row]]] = True
@@ -123,9 +127,11 @@ class Instant:
         """
         kinds, gammas = self.system.kinds, self.system.of_groups("gamma")[self._row]
         reactions = np.isin(kinds, ("kappa", "mu"))
+        # gammas that read multipliers
         reads = np.zeros(self.system.rows, dtype=bool)
         reads[self._row[gammas & reactions[self._column]]] = True
         follows = reactions.copy()
+        # efforts that contents gain
         reads |= self._over.rates
         follows[self._column[reads[self._row] & (kinds == "e")[self._column]]] = True
         told = np.zeros(self.system.rows, dtype=bool)
@@ -135,12 +141,14 @@ class Instant:
     def broken(self, t: float, y: Floats, yd: Floats, magnitude: Floats) -> bool:
         """Whether a constraint on flows does not hold at the point, or where there are any, a momentum's."""
         flows = self._now(self._constraints)
+        # no constraint on flows holds now
         if not flows.any():
             return False
         flows |= self._momenta
         jy, _ = self.system.jacobian(t, y, yd)
         size = np.zeros(self.system.rows)
         np.add.at(size, self._row, np.abs(jy) * np.maximum(magnitude, np.abs(y))[self._column])
+        # off by more than its terms allow
         r = np.abs(self.system.residual(t, y, yd))
         with np.errstate(all="ignore"):
             return bool((r > BROKEN * size)[flows].any())
@@ -154,9 +162,11 @@ class Instant:
         for at in (y, y + magnitude):  # where a law is flat at rest alone it holds more
             slope = self.system.jacobian(t, at, yd)[0]
             sloping[self._row[(slope != 0.0) & ~contents[self._column]]] = True
+        # terms of the row at the point
         size = np.bincount(self._row, np.abs(slope) * np.maximum(magnitude, np.abs(y))[self._column], self.system.rows)
         off = np.where(self._now(self._states), np.abs(self.system.residual(t, y, yd)), 0.0)
         full = np.isposinf(off) | (~sloping & (off > BROKEN * size))
+        # too much, or no number
         for cause, wrong in (("overfull", full), ("nonfinite", np.isnan(off))):
             if wrong.any():
                 return cause, int(np.argmax(wrong))
@@ -188,13 +198,16 @@ class Instant:
 
         Where nothing resists an impulse of flow the rows of displacements alone say where they are.
         """
+        # slopes at the point, inertia besides
         slope, inertia = self._slopes(t, y, yd, magnitude)
         heavy, carried = self._held
         jumps, met = (self.system.kinds == "q") | self._over.contents, self._now(self._light) | self._over.rates
+        # pulses of what may jump, and inertia that resists
         taken, held = self._taken(met, jumps, self._acting() | self._loose), np.flatnonzero(heavy | carried)
         i = 2 * np.append(self._pulses.row[taken], self._row[held]) + 1
         j = np.append(self._pulses.column[taken], 2 * self._moved[self._column[held]])
         v = np.append(self._pulses.values(slope, inertia)[taken], np.where(heavy, inertia, slope)[held])
+        # what follows moves freely
         ease = np.where(np.isin(self.system.kinds, FOLLOWS), LOOSE, 1.0)
         behind = self._given.copy()
         behind[self.system.held[0]] = True  # they read "multiplier = 0"
@@ -203,6 +216,7 @@ class Instant:
         asked = Asked(behind, moves, met, lambda *_: (i, j, v, v), ease)
         found, impulse = self._jump((t, y, yd), magnitude, asked)
         together = self._hidden(slope, jumps) if sums else None
+        # sums that the point does not meet are asked for too
         if together is not None and self._unmet(together, t, found, yd, magnitude):
             found, impulse = self._jump((t, y, yd), magnitude, replace(asked, sums=together))
         found = np.where(jumps, found, y)
@@ -246,13 +260,16 @@ class Instant:
         [rows]: what acts on balances besides; None: zero.
         """
         push, open_ = np.zeros(self.system.rows) if push is None else push, self._leaves_open(t, y, yd, magnitude)
+        # nothing asks for other flows
         if aims is None and not (push.any() or open_ or self.broken(t, y, yd, magnitude)):
             return y, np.zeros(y.size)
+        # momenta and flows jump together, by impulses
         moves, behind, ease = self._moving, self._now(self._constraints) | self._states, 1.0
         met, pulses = self._balances | self._over.rates | self._told, self._pulses
         taken = self._taken(met, moves, self._acting() & self._struck)
         i, j = 2 * pulses.row[taken] + 1, pulses.column[taken]
         rated = taken[j % 2 == 0]
+        # laws that bend: the mean slope along the way counts
         curved = bool((~self._over.affine[pulses.row[rated]]).any())
         rated = rated[self._balances[pulses.row[rated]]] if open_ else rated[:0]
         if open_:  # finite terms decide, rates of the others among them
@@ -267,6 +284,7 @@ class Instant:
             if told is not None:  # friction on a reaction that is nothing yet
                 jy = np.where(told, self.system.jacobian(t, np.where(reacts, here + magnitude, here), yd)[0], jy)
             slopes = pulses.values(jy, jyd)[at]
+            # straight: the slope is the mean
             if not curved:
                 return i, j, slopes, slopes
             means = pulses.values(jy, self._mean(t, (y, here), yd, jyd))
@@ -282,8 +300,10 @@ class Instant:
         momenta and contents of nonlinear stores jump by, whatever the way is.
         """
         begin, end = way
+        # the slope does not change along the way
         if np.array_equal(jyd, self.system.jacobian(t, 0.5 * (begin + end), yd)[1], equal_nan=True):
             return jyd
+        # Gauss points of the way
         parts, weights = _gauss()
         at = (begin + 0.5 * (1.0 + part) * (end - begin) for part in parts.tolist())
         found = 0.5 * np.asarray(weights) @ [self.system.jacobian(t, y, yd)[1] for y in at]
@@ -294,6 +314,7 @@ class Instant:
         inertia = self.system.jacobian(t, y, yd)[1]
         inert = self._balances[self._row] & (self.system.kinds == "f")[self._column] & (inertia != 0.0)
         row, column = self._row[inert], self._column[inert]
+        # flows that inertia and nothing else determines
         free = free_unknowns((self.system.rows, y.size), (row, column, inertia[inert] * magnitude[column]))
         return free is not None and bool(free[column].any())
 
@@ -303,6 +324,7 @@ class Instant:
         """
         steepest = np.zeros(y.size)
         jy, _ = self.system.jacobian(t, y, yd)
+        # rows of states by implicit efforts: flat where no slope is left
         mine = self._states[self._row]
         np.maximum.at(steepest, self._column[mine], np.abs(jy[mine]))
         return np.where((self.system.kinds == "e") & ~self._struck & (steepest == 0.0), y + magnitude, y)
@@ -310,6 +332,7 @@ class Instant:
     def _with(self, here: Any, integrals: Any, jy: Floats, asked: Asked) -> tuple[Any, Any, Floats]:
         """Entries of what holds behind the instant, of single rows (here) and of sums, and of integrals."""
         parts = [here]
+        # sums of rows by what moves and is no flow
         if asked.sums is not None:
             moves = np.flatnonzero((asked.moves & (self.system.kinds != "f") & ~self._over.force)[self._column])
             parts.append(asked.sums.entries(self._row[moves], self._column[moves], jy[moves]))
@@ -334,32 +357,40 @@ class Instant:
         """
         t, start, yd = before
         y, integral, step = start if begun is None else begun, np.zeros(start.size), np.inf
+        # entries of rows that hold behind the instant
         here = asked.behind[self._row] & asked.moves[self._column]
+        # magnitudes, and impulses without one
         scale = np.stack([magnitude * asked.ease, np.full(start.size, np.nan)], axis=1).ravel()
+        # Newton's method on rows and integrals at once
         for _ in range(ITERATIONS):
             jy, jyd = (np.where(np.isfinite(item), item, 0.0) for item in self.system.jacobian(t, y, yd))
             i, j, v, mean = asked.integrals(jy, jyd, y)
             aim = np.zeros((self.system.rows, 2)) + aims
             left = self.system.residual(t, y, yd)
             aim[asked.behind, 0] -= left[asked.behind]
+            # sums beside single rows
             if asked.sums is not None:
                 aim = np.append(aim, np.outer(-asked.sums.of(left), (1.0, 0.0)), axis=0)
             change, aim = np.stack([y - start, integral], axis=1).ravel(), aim.ravel()
             np.add.at(aim, i, -mean * change[j])
+            # converged: what is left says whether it balances
             if step <= CONVERGED:
                 break
             entries = self._row[here], self._column[here], jy[here]
             try:
                 move = least_measured(self._with(entries, (i, j, v), jy, asked), aim, scale)
             except NotFiniteError:
+                # no numbers: as it was, unless there must be some
                 if sure:
                     raise
                 return start, np.zeros(start.size)
             y, integral = y + move[::2], integral + move[1::2]
             step = float((np.abs(move[::2]) / np.maximum(magnitude, np.abs(y))).max(initial=0.0))
         wanted, aim = (np.zeros((self.system.rows, 2)) + aims).ravel(), aim[: 2 * self.system.rows]
+        # impulses are as large as what they balance
         size = np.fmax(scale, np.stack([np.maximum(np.abs(y), np.abs(start)), 0.0 * y], axis=1).ravel())
         off = np.where(asked.met, missed((i, j, mean), size, (aim, wanted))[1::2], 0.0)
+        # a balance over the instant that is not met
         if off.any():
             raise UnbalancedError(int(np.argmax(off)))
         return np.where(np.abs(y - start) > ROUND_OFF * magnitude, y, start), np.where(self._integrated, integral, 0.0)

@@ -58,6 +58,7 @@ class Integrated:
     def pulses(self, moved: NDArray[np.int64], force: Mask) -> Pulses:
         """The terms of rates, of flows by the displacements that they move, of forces (both [unknowns])."""
         flows = moved[self.column]
+        # rates, flows by their displacements, forces
         at = [np.flatnonzero(of) for of in (self.in_rate, self.in_y & (flows >= 0), self.in_y & force[self.column])]
         columns = 2 * self.column[at[0]].astype(np.int64), 2 * flows[at[1]], 2 * self.column[at[2]].astype(np.int64) + 1
         entry = np.concatenate(at)
@@ -70,12 +71,15 @@ def integrated(settled: System) -> Integrated:
 
 
 def _integrated(settled: System) -> Integrated:
+    """Places and kinds of a settled system's entries, by which its rows are integrated over an instant."""
     row, column, form = settled.pattern.row.astype(np.int64), settled.pattern.columns_of(), settled.another("3").form
     (in_y, in_rate), rated, constant = settled.structural(), settled.of_groups("lambda"), affine(settled)
     moved = np.full(settled.unknowns, -1, dtype=np.int64)
     moved[form.k_f] = form.k_q
+    # what rows read by value, or by a rate of another kind
     read, rates = np.zeros(settled.unknowns, dtype=bool), np.zeros(settled.rows, dtype=bool)
     read[column[in_y | (in_rate & ~rated[row])]] = True
+    # dynamic variables by their own rates: read by others, or alone
     own = in_rate & rated[row] & (settled.kinds == "s")[column]
     gains = own & constant[row] & read[column]
     rates[row[gains]] = True
@@ -94,10 +98,12 @@ def missed(entries: tuple[NDArray[np.int64], Ints, Floats], size: Floats, aims: 
     """
     (i, j, v), (left, asked) = entries, np.abs(aims)
     v = np.abs(v)
+    # sizes of impulses grow until each has one
     while True:
         terms, found = asked + np.bincount(i, v * size[j], left.size), np.zeros(size.size)
         np.maximum.at(found, j, np.divide(terms[i], v, out=np.zeros(v.size), where=v > 0.0))
         none = (size == 0.0) & (found > 0.0)
+        # every column has its size
         if not none.any():
             return np.where((left > BROKEN * terms) & (terms > 0.0), left, 0.0)
         size = np.where(none, found, size)

@@ -31,6 +31,7 @@ def _held(starter: Starter, t: float, x: Floats) -> Mask:
 
 def _levels(starter: Starter, t: float, x: Floats, free: Mask) -> tuple[Mask, ...]:
     """The unknowns that carry the state, in the order in which they move least [unknowns]."""
+    # first momenta that are written, then displacements, ...
     state, placed = free & ~starter.following(t, x), starter.moves("start")
     held, hollow, momenta = _held(starter, t, x), starter.hollow, starter.momenta
     said, unsaid = state & starter.written, state & ~starter.written
@@ -42,10 +43,12 @@ def _levels(starter: Starter, t: float, x: Floats, free: Mask) -> tuple[Mask, ..
 
 def inertias(starter: Starter, t: float, x: Floats) -> Floats:
     """Inertia of each flow, as the balances say what stores hold [unknowns as written]; none where these are shared."""
+    # shared inertia: no measure of their own
     system, known = starter.system, starter.equations
     if not known.balanced:
         return np.zeros(0)
     y, yd = starter.expand(x)
+    # without momenta rates alone are needed
     some = known.momentum.size > 0
     jy, jyd = system.jacobian(t, y, yd) if some else (None, system.slopes(t, y, yd, rate=True))
     del y, yd
@@ -59,12 +62,16 @@ def weights(starter: Starter, t: float, x: Floats, scale: Floats, inert: Floats)
     they share alike.  inert: as `inertias` says.
     """
     known, content = starter.equations, scale.copy()
+    # contents of flows: momenta, by their inertia
     np.multiply(content[: inert.size], np.abs(inert), out=content[: inert.size], where=inert != 0.0)
     settled = starter.settled
+    # of one measure the largest is one
     content /= largest_of_group(settled.once_if_small("measures", lambda: known.measures(settled)), content)
+    # what is not written moves more easily
     np.multiply(content, WEIGHT["unwritten"], out=content, where=~starter.written)
     own = largest_of_group(known.alike, scale)
     np.multiply(WEIGHT["following"], np.divide(scale, own, out=own), out=own)
+    # what follows moves freely
     np.copyto(content, own, where=starter.following(t, x))
     content[starter.n :] = WEIGHT["following"]  # rates have magnitudes of their own each
     return content
@@ -80,12 +87,15 @@ def problem_of(
     inert = inertias(starter, t, x)
     starter.spare()  # of a large model the room counts
     scale = starter.scale(t, x)
+    # levels need full matrices
     ordered = least and max(int(rows.sum()), int(free.sum())) <= DENSE
     levels = _levels(starter, t, x, free) if ordered else ()
+    # a floor, so that small unknowns may move at all
     if least:
         scale = np.maximum(scale, FLOOR * starter.largest_alike(np.maximum(scale, np.abs(x))))
     weight = weights(starter, t, x, scale, inert)
     del inert
+    # fixed values count as large as they are
     fixed = starter.pinned & ~free
     scale = np.where(fixed, np.abs(x), scale) if fixed.any() else scale  # of a large model the room counts
     starter.spare()

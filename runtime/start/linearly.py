@@ -52,9 +52,11 @@ class Rows:
 
     def contradict(self, x: Floats) -> bool:
         """Whether they are linear in what may move from x on, and leave one of them unmet."""
+        # too large for dense elimination
         if x.size > DENSE:
             return False
         here, free = self.slopes(x), self.free[self.columns]
+        # at a point aside: other slopes mean a curve
         aside = self.size * np.random.default_rng(1).uniform(0.5, 1.5, x.size)
         a, b = here[free], self.slopes(np.where(self.free, x + aside, x))[free]
         if not _alike(a, b).all():
@@ -68,6 +70,7 @@ class Rows:
         here, free = self.slopes(x), self.free[self.columns]
         step = self.size * np.random.default_rng(1).uniform(0.5, 1.5, x.size)
         linear = self.asked.copy()
+        # at several points around
         for part in AROUND:
             there = self.slopes(np.where(self.free, x + part * step, x))
             linear[self.rows[free & ~_alike(here, there)]] = False
@@ -77,11 +80,13 @@ class Rows:
         """Whether an elimination leaves one of the rows asked unmet, which keeps small coefficients beside large ones
         (the leak of a blocked bridge beside kiloamperes); here: slopes.  NotFiniteError.
         """
+        # matrix of what may move, and sizes of terms
         free = self.free[self.columns]
         matrix, terms = np.zeros((asked.size, x.size)), np.zeros(asked.size)
         np.add.at(matrix, (self.rows[free], self.columns[free]), here[free])
         np.add.at(terms, self.rows, np.abs(here) * np.maximum(np.abs(x), NOTHING * self.size)[self.columns])
         matrix, aim, (step, doubt) = matrix[asked], -self.residual(x)[asked], np.zeros((2, x.size))
+        # no numbers: nothing is said
         if not (np.isfinite(matrix).all() and np.isfinite(aim).all()):
             raise NotFiniteError
         return graded(matrix, aim, step, MISSES * terms[asked], doubt) == MISSED
@@ -98,6 +103,7 @@ def unmet(settler: Settler, t: float, y: Floats, yd: Floats, state: Mask) -> boo
     """Whether linear algebra says that no point at t has this state of y, yd [unknowns as written]."""
     settled, rates = settler.system, settler.rates
     n, columns = settled.unknowns, settled.pattern.columns_of()
+    # unknowns, then rates
     moved = columns_of_rates(n, rates, columns)
     rated = moved >= 0
 
@@ -121,7 +127,7 @@ def unmet(settler: Settler, t: float, y: Floats, yd: Floats, state: Mask) -> boo
 
 
 def no_start(starter: Starter, t: float, x: Floats, free: Mask) -> bool:
-    """The same of a start, from x [unknowns of the start] by what is free."""
+    """Whether linear algebra says that there is no start, from x [unknowns of the start] by what is free."""
     return _of_a_start(starter, t, x, free).contradict(x)
 
 

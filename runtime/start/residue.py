@@ -51,11 +51,13 @@ class Residue:
 
     def cleared(self, rows: Rows, t: float, free: Floats) -> Floats:
         """Free terms [rows] at t, without what is left of a zero in rows of rates."""
+        # in parts: of a large model no copy
         parts = [slice(k, k + PART) for k in range(0, free.size, PART)]
         largest = max((_largest(free[part]) for part in parts), default=0.0)
         tiny = [k.start + np.flatnonzero(_between(np.abs(free[k]), RESIDUE * largest)) for k in parts]
         places = np.concatenate([np.zeros(0, dtype=np.int64), *tiny])
         places = places[rows.groups(*HIDDEN)[places]] if places.size else places
+        # nothing tiny in rows of rates
         if not places.size:
             return free
         left = free.copy()
@@ -64,6 +66,7 @@ class Residue:
 
     def _at_other_times(self, rows: Rows, t: float) -> Floats:
         """The largest of each free term beside the guess [rows]."""
+        # residuals at other instants, once for each t
         if self._later is None or self._later[0] != t:
             found = [np.abs(rows.residual(t + beyond, rows.guess)) for beyond in LATER]
             self._later = t, np.max([np.where(np.isfinite(size), size, 0.0) for size in found], axis=0)

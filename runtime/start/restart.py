@@ -79,14 +79,15 @@ class Restart:
             raise SolverFailure(found[0], t, 0.0, row=self.settler.system.row_label(found[1]))
 
     def struck(self, t: float, y: Floats, yd: Floats, *, quickly: bool = False) -> tuple[Floats, Floats, Floats] | None:
-        """The same with the impulses [unknowns as written] that took the flows there, of a set of constraints that is
-        tried; quickly: without a search.  Sizes stay as they were: where it has no rank its multipliers are without
-        bound.
+        """The point on the far side at t with the impulses [unknowns as written] that took the flows there, of a set of
+        constraints that is tried; quickly: without a search. Sizes stay as they were: where it has no rank its
+        multipliers are without bound.
         """
         known = self.magnitude(y.size)
         try:
             found = self._struck(t, y, yd, known, quickly=quickly)
         except UnbalancedError:
+            # a balance that is not met: no point of this set
             found = None
         lib.reader(self.settler.core.contents.scale, y.size)[:] = known
         return None if found is None or not found[3] else found[:3]
@@ -94,7 +95,9 @@ class Restart:
     def _struck(
         self, t: float, y: Floats, yd: Floats, magnitude: Floats, *, quickly: bool = False
     ) -> tuple[Floats, Floats, Floats, bool] | None:
-        """The same, and whether rates of rows are met too; magnitude [unknowns as written] before it."""
+        """The point on the far side, its impulses, and whether rates of rows are met too; magnitude [unknowns as
+        written] before it.
+        """
         before, yd = y, yd.copy()
         yd[self.settler.system.idle_multipliers()] = 0.0  # what does not hold any more pushes no more
         same, moved = _held(self.settler, t, (y, yd), magnitude)
@@ -110,17 +113,21 @@ class Restart:
             if steep is None and not self._contradicts:
                 return None
         push = None
+        # states jump: displacements first, then flows
         if same is None or moved[self.settler.system.kinds == "q"].any():
             y, push = self.instant.displacements(t, y, yd, magnitude, sums=self.sums)
         y, impulse = self.instant.flows(t, y, yd, magnitude, push=push)
         kept = self._kept(t, y, yd, magnitude)
+        # the point that holds the state behind the jump
         if kept is not None:
             return *kept, impulse, self._lives
         # what follows may jump by far more than its magnitude: at equal weights that would move the state
         self.settler.core.contents.ready = 0
         found, rate, done = self.settler.settle(t, y, yd, hold=HELD)
+        # settled with a state that hardly moves
         if done and self._stays(found, y, magnitude):
             return found, rate, impulse, self._lives
+        # linear algebra tells that there is none
         if quickly or unmet(self.settler, t, y, yd, self.settler.alone(self.state)):
             return None
         # what follows is sought from where it was: impulses move it along slopes that steep laws had before the jump
@@ -144,6 +151,7 @@ class Restart:
         sizes: at rest a law may be flat, and a state that moves is then the nearest way out, though nothing forces it.
         """
         follows = np.isin(self.settler.system.kinds, ("f", "e")) & ~self.state
+        # beside the jump, with guesses of flows and efforts
         for part in GUESSES if follows.any() else GUESSES[:1]:
             beside = np.where(follows, y + part * magnitude, y), yd
             if (found := still(self.settler, t, beside, self.state, magnitude)) is not None:
@@ -155,7 +163,8 @@ class Restart:
         return lib.reader(self.settler.core.contents.scale, number).copy()
 
     def _search(self, t: float, y: Floats, yd: Floats, *, free: bool = True) -> tuple[Floats, Floats] | None:
-        """The same as a start finds it: first with the state held, then (free) with everything free."""
+        """y, yd as a start finds them: first with the state held, then (free) with everything free."""
+        # rows of a start, without initial values
         starter = Starter(self.settler.system.another("3"))
         starter.every &= ~starter.groups("initial")
         # nothing is known behind a jump by what was next to zero before it, rates least of all
@@ -165,6 +174,7 @@ class Restart:
         idle, state = np.zeros((2, guess.size), dtype=bool)
         idle[starter.n :] = np.isin(starter.rates, starter.system.idle_multipliers())
         guess[idle], state[: y.size] = 0.0, self.state
+        # the state held, then free
         for held in (state, np.zeros_like(state))[: 1 + free]:
             may = ~(idle | held)
             self._contradicts = contradicting(starter, t, guess, may) is not None

@@ -57,6 +57,7 @@ def columns_of_rates(unknowns: int, rates: Ints, columns: Ints) -> Ints:
 def _rates(settled: System) -> Ints:
     used = np.zeros(settled.unknowns, dtype=bool)
     pattern = settled.pattern
+    # rates that stand in rows of this form
     for call in settled.form.calls:
         used[entries_of(settled.description, call)[1].column] = True
     assert pattern.unknowns == settled.unknowns
@@ -68,6 +69,7 @@ def inertial_rows(settled: System) -> NDArray[np.bool_]:
     pattern, momentum = settled.pattern, settled.of_groups("momentum")
     in_y, in_rate = settled.structural()
     columns = pattern.columns_of()
+    # a momentum by itself has no inertia
     alone = in_y & momentum[pattern.row]
     alone &= (np.bincount(pattern.row[alone], minlength=settled.rows) == 1)[pattern.row]
     found = np.zeros(settled.rows, dtype=bool)
@@ -80,6 +82,7 @@ def inertial_rates(settled: System) -> NDArray[np.bool_]:
     inertial, groups = inertial_rows(settled), settled.form.groups
     balances = {family: first for group, family, first in groups if group == "dynamics"}
     mask = np.zeros(settled.rows, dtype=bool)
+    # rates of balances by the rows of these
     for group, family, first in groups:
         if group == "dynamics_rate":
             own, size = balances[family], settled.description.rows[family].size
@@ -99,6 +102,7 @@ def flows_open(
 
 def _flows_open(settled: System, t: float, y: Floats, yd: Floats, state: NDArray[np.bool_], turning: bool) -> bool:
     flows = (settled.kinds == "f") & ~state
+    # what laws that may turn leave open
     open_ = _open(settled, (t, y, yd), state, flows if turning else np.zeros_like(flows))
     return open_ is None or bool(open_[: settled.unknowns][flows].any())
 
@@ -111,10 +115,12 @@ def _open(
     """
     (jy, jyd), pattern, rates = settled.jacobian(*point), settled.pattern, rates_of(settled)
     n, columns = settled.unknowns, pattern.columns_of()
+    # laws that may be flat say nothing
     if untold.any():
         laws = settled.of_groups("dynamics", "gamma", "gamma_rate") & ~affine(settled)
         jy = np.where(laws[pattern.row] & untold[columns], 0.0, jy)
     moved = columns_of_rates(n, rates, columns)
+    # unknowns that do not carry the state, and rates
     free, rated = ~state[columns], moved >= 0
     i = np.concatenate([pattern.row[free], pattern.row[rated]])
     j = np.concatenate([columns[free], moved[rated]])
@@ -136,13 +142,17 @@ def values_told(
 def _values_told(
     valued: System, settled: System, point: tuple[float, Floats, Floats], state: NDArray[np.bool_], read: frozenset[int]
 ) -> bool:
+    """Whether rows of values alone tell at a point all that is read, besides the state."""
+    # the same rows: nothing is saved
     if valued.rows == settled.rows:
         return False
     n, told, rates = valued.unknowns, rates_of(valued), rates_of(settled)
     wanted = np.zeros(n, dtype=bool)
+    # what rows read
     wanted[settled.pattern.columns_of()[settled.structural()[0]]] = True
     moving = state | np.isin(settled.family_of, list(read))
     open_ = _open(valued, point, state, np.zeros(n, dtype=bool))
+    # something that is read stays open
     if open_ is None or open_[:n][wanted & ~state].any():
         return False
     return bool(np.isin(rates[moving[rates]], told).all() and not open_[n:][moving[told]].any())
@@ -168,6 +178,7 @@ class Settler:
         common: Ints | None = None,
     ) -> None:
         self.system, self._points = settled, settled.unknowns
+        # all unknowns, or what is left of them
         self._left = settled if condensed is None else condensed
         self.rates = rates_of(settled) if condensed is None else condensed.rates
         if condensed is not None:
@@ -181,17 +192,20 @@ class Settler:
         self._state[:n] = state
         self._part = self._state.astype(np.int8)
         self._pairs = self._between = np.zeros((0, 2), dtype=np.int32)
+        # groups by their differences
         if common is not None and (common >= 0).any():
             self._by_differences(common, np.arange(n, dtype=np.int32) if condensed is None else condensed.kept)
         self._kinematics = kinematics
         self.scale, self._time = np.concatenate([magnitude, magnitude[self.rates] / time_scale]), time_scale
         self.linear: Any = None
+        # of a large one factors are found when they are wanted
         if self._moves <= LATER:
             self._provide()
         self._allocate()
 
     def _by_differences(self, common: Ints, kept: Ints) -> None:
         """Of groups whose members are all kept the differences over each store carry the state."""
+        # groups that lose a member are none
         gone = np.delete(common, kept)
         common = np.where(np.isin(common, gone), np.int32(-1), common)
         place = numbers_of(common.size, kept)
@@ -204,6 +218,7 @@ class Settler:
         carry it, the largest of them.
         """
         found = np.abs(change)
+        # pairs by their difference, both ways
         found[self._between] = 0.0
         for one, other in (self._between.T, self._between.T[::-1]):
             np.maximum.at(found, one, np.abs(change[one] - change[other]))
@@ -219,6 +234,7 @@ class Settler:
         """Pattern of [D G^T; G -eps] and the places of the parts."""
         pattern, n = self._left.pattern, self._n
         number = self._moves + self._left.rows
+        # entries by values and by rates, with their transposes
         columns, rows = pattern.columns_of(), pattern.row
         moved = columns_of_rates(n, self.rates, columns)
         with_rate = moved >= 0
@@ -236,6 +252,7 @@ class Settler:
             Places(*self._pairs.T[::-1]),
         ]
         found, slots = compress(number, number, parts)
+        # entries without a rate have no place
         for k in (2, 3):
             full = np.full(pattern.entries, -1, dtype=np.int32)
             full[with_rate] = slots[k]
@@ -251,9 +268,11 @@ class Settler:
     def _sorts(self) -> Ints:
         """Of the rows, as core/system/settle.h names them: constraints, rates of other rows, others, left out."""
         found = np.zeros(max(self.system.rows, 1), dtype=np.int32)
+        # constraints, rates, all else
         for group, family, first in self.system.form.groups:
             sort = 1 if group in ("phi", "phi_rate", "psi") else 2 if group in RATES else 0
             found[first : first + self.system.description.rows[family].size] = sort
+        # rates of inertia are unknown at a point
         if self.system.form.name == "rated":
             found[: self.system.rows][inertial_rates(self.system)] = LEFT_OUT
         return found if isinstance(self._left, System) else found[self._left.kept_rows]
@@ -265,9 +284,12 @@ class Settler:
         self.linear = self._order.linear(self.pattern)
 
     def _saddle_order(self) -> Order:
+        """The order in which the saddle-point matrix is eliminated: pivots by rows that tell what follows."""
+
         def own() -> Ints:
             """Rows that tell what follows from the state."""
             unknowns, rates = own_rows(self.system), own_rows_of_rates(self.system)
+            # of all unknowns; of a condensed form by places of what is kept
             if not isinstance(self._left, CondensedSystem):
                 return np.concatenate([unknowns, rates[self.rates]])
             kept = self._left.kept
@@ -284,10 +306,11 @@ class Settler:
             setattr(self.core.contents, name, lib.pointer(slot))
 
     def _provided(self) -> Callable[[], int]:
-        """The same when they are wanted first; where a basis is enough they never are."""
+        """A callback that finds the factors when the core first wants them; where a basis is enough it never does."""
         own = weakref.ref(self)
 
         def provide() -> int:
+            # gone meanwhile: nothing to provide
             settler = own()
             if settler is None:
                 return 1
@@ -298,6 +321,7 @@ class Settler:
         return provide
 
     def _allocate(self) -> None:
+        """Makes the core's structure, with places and factors, or with what provides them later."""
         self.core = lib.core.sd_settle_new(c.byref(self._left.core), self.linear, int(self.rates.size))
         if not self.core:
             raise MemoryError
@@ -305,6 +329,7 @@ class Settler:
         core.state, core.follows, core.time = lib.pointer(self._part), FREE**2, self._time
         core.rate = lib.pointer(self.rates)
         core.pair, core.pairs = lib.pointer(self._pairs), len(self._pairs)
+        # factors are provided when the core asks for them
         if self.linear is None:
             self._wanted = lib.PROVIDE(self._provided())
             core.provide = c.cast(self._wanted, c.c_void_p)
@@ -322,6 +347,7 @@ class Settler:
         columns, rows = pattern.columns_of(), pattern.row
         moved = columns_of_rates(self._n, self.rates, columns)
         with_rate = moved >= 0
+        # G^T by values, then by rates
         parts = [Places(columns, rows), Places(moved[with_rate], rows[with_rate])]
         return tall_order(compress(self._moves, self._left.rows, parts)[0])
 
@@ -354,6 +380,7 @@ class Settler:
         hold: times the weight of the state; HELD moves it only where the rows leave nothing else.
         """
         self.core.contents.hold = hold
+        # the core works in place
         a, b = self.system._buffer(y), self.system._buffer(yd)
         failed = lib.core.sd_settle_point(self.core, t, lib.pointer(a), lib.pointer(b))
         self.core.contents.hold = 1.0
@@ -361,7 +388,7 @@ class Settler:
         return a[: self._points], b[: self._points], not failed
 
     def moved(self, t: float, y: Floats, yd: Floats) -> tuple[Floats, Floats, bool]:
-        """The same to round-off, though the state must move for it: not within a basis that leaves it where it is."""
+        """`settle` to round-off, though the state must move for it: not within a basis that leaves it where it is."""
         core = self.core.contents
         basis, enough = core.basis, core.enough
         core.basis, core.enough, core.ready = None, 0.0, 0
@@ -372,6 +399,7 @@ class Settler:
     @contextmanager
     def exactly(self) -> Iterator[None]:
         """Points settle to round-off meanwhile, in a draft too: behind a jump what is left over moves the state."""
+        # what was factored belongs to another accuracy
         core = self.core.contents
         enough, core.enough = core.enough, 0.0
         core.ready = 0
@@ -381,9 +409,11 @@ class Settler:
             core.enough = enough
 
     def held(self, t: float, y: Floats, yd: Floats) -> tuple[Floats, Floats, bool]:
-        """The same with the state where it is: of large ones within a basis that moves none of it, if there is one."""
+        """`settle` with the state where it is: of large ones within a basis that moves none of it, if there is one."""
+        # small, or without a basis: by weights
         if self._moves <= LARGE or self.linear is not None or not self.core.contents.basis:
             return self.settle(t, y, yd, hold=HELD)
+        # a basis that leaves the state alone
         slack, self.core.contents.slack = self.core.contents.slack, 0.0
         found = self.settle(t, y, yd)
         self.core.contents.slack = slack

@@ -80,6 +80,7 @@ class ConsistentState:
 
     def farther(self, other: ConsistentState) -> bool:
         """Whether it is farther from the guess than another state of the model, by what moves least."""
+        # one that kept its guesses is nearer than one that moved
         if self.kept or other.kept:
             return other.kept and not self.kept
         apart = (a - b for a, b in zip(self.far, other.far, strict=True))
@@ -103,6 +104,7 @@ class ConsistentState:
     def for_form(self, system: System) -> tuple[Floats, Floats]:
         """y, yd in the layout of an index form: new multipliers are zero.  Read-only where they are the state's own."""
         own, own_d = self.y, self.yd
+        # a form of the same size
         if system.unknowns == own.size:
             return read_only(own[:]), read_only(own_d[:])
         y, yd = np.zeros(system.unknowns), np.zeros(system.unknowns)
@@ -111,6 +113,7 @@ class ConsistentState:
 
     def without_noise(self, y: Floats) -> Floats:
         """Its y in any layout with these zeros."""
+        # no zero is known as round-off
         if self.zeros is None:
             return y
         clean, zeros = y.copy(), whole_of(self.zeros)
@@ -120,6 +123,7 @@ class ConsistentState:
 
 def _onto(starter: Starter, t: float, x: Floats, guess: Floats, *, rows: Mask, free: Mask) -> Floats:
     """The point nearest to the guess on these rows, from x in these unknowns; x where they do not hold."""
+    # no rows, or nothing free
     if not (rows.any() and free.any()):
         return x
     found = solve(problem_of(starter, t, x, guess, rows=rows, free=free), x)
@@ -130,8 +134,10 @@ def _begun(starter: Starter, t: float, guess: Floats, free: Mask) -> Floats:
     """Where the iteration begins, on the roots that are meant: what written expressions give where the others are as
     guessed, then what follows beside implicit unknowns at their guesses.
     """
+    # expressions that are written, then what follows
     own = free & ~starter.written & (np.arange(free.size) < starter.n)
     x, held = _onto(starter, t, guess, guess, rows=starter.told, free=own), starter.moves("e") & starter.written
+    # no effort was guessed
     if not held.any():
         return x
     rows, may = (
@@ -146,6 +152,7 @@ def _finite(starter: Starter, t: float, x: Floats, free: Mask) -> Floats:
     other rows as written, as long as these become fewer.
     """
     before = starter.settled.rows
+    # as long as fewer rows are no numbers
     while 0 < (number := int(np.count_nonzero(~np.isfinite(rows := starter.residual(t, x))))) < before:
         may, before = free & starter.following(t, x), number
         told = without_rates(starter) & np.isfinite(rows) & starter.reading(may)
@@ -159,6 +166,7 @@ def _aimed(starter: Starter, t: float) -> Floats:
     network the contents of each store are guessed, and stay.
     """
     families = starter.system.description.families
+    # a network: contents of stores are guessed, and stay
     if any(f.kind in ("slack", "unsaid") and not f.owner.startswith(HELD) for f in families):
         return starter.guess
     return _with_contents(starter, t, _with_momenta(starter, t))
@@ -169,14 +177,17 @@ def _with_momenta(starter: Starter, t: float) -> Floats:
     known, guess = starter.equations, starter.guess
     joined, flows, placed = known.joined, starter.moves("f"), starter.moves("q")
     tied = starter.groups("psi", "phi_rate")
+    # no momentum is shared, or all is at rest
     if not (joined.any() and (guess[flows].any() or starter.residual(t, guess)[tied].any())):
         return guess  # of a large model the room counts
     unsaid = flows & starter.free & ~starter.written
+    # flows of which nothing is said, by what ties them
     x = _onto(starter, t, guess, guess, rows=tied | starter.groups("phi"), free=unsaid | placed & starter.free).copy()
     _rest(starter, t, x, rows=tied, of=unsaid)
     rows, missed = known.guessed
     x[missed] = starter.residual(t, x)[rows]
     momentum, own = known.momentum[joined[known.flow]], own_unknown(starter.settled, "momentum", "f")
+    # momenta of shared inertia
     if momentum.size and not starter.written[momentum].any():
         free = np.zeros(x.size, dtype=bool)
         free[momentum] = True
@@ -189,6 +200,7 @@ def _rest(starter: Starter, t: float, x: Floats, *, rows: Mask, of: Mask) -> Non
     """Those unknowns of X that these rows alone do not tell are as guessed again, in place."""
     take = rows[starter.rows] & of[starter.columns]
     entries = starter.rows[take], starter.columns[take], starter.jacobian(t, x)[take]
+    # what the rows leave open is as guessed
     choice = free_unknowns((starter.settled.rows, x.size), entries)
     at_rest = of if choice is None else of & choice
     x[at_rest] = starter.guess[at_rest]
@@ -199,6 +211,7 @@ def _with_contents(starter: Starter, t: float, x: Floats) -> Floats:
     those efforts that balances alone make of what is said.
     """
     efforts, gammas = starter.moves("e"), starter.groups("gamma")
+    # coupled stores: efforts by the balances, then displacements by the efforts
     if (_number(starter, gammas, efforts) > 1).any():  # of coupled stores
         balances = starter.groups("dynamics") & ~starter.reading(np.arange(x.size) >= starter.n)  # no rate in them
         unsaid = starter.moves("e", "f") & starter.free & ~starter.written
@@ -206,6 +219,7 @@ def _with_contents(starter: Starter, t: float, x: Floats) -> Floats:
         _rest(starter, t, found, rows=balances, of=unsaid)
         x = np.where(efforts, found, x)
     told = efforts & (x != 0.0)
+    # no effort is said
     if not told.any():
         return x
     rows = gammas & starter.reading(told)
@@ -223,6 +237,7 @@ def _number(starter: Starter, rows: Mask, unknowns: Mask) -> Places:
 def _attempt(starter: Starter, t: float, guess: Floats, free: Mask, *, quickly: bool = False) -> tuple[Solution, str]:
     """The first strategy that holds, from the guess, and its name; the least residual and "" where none does."""
     x = _finite(starter, t, _begun(starter, t, guess, free), free)
+    # strategies in turn, the exact solution of the first that holds
     best = Solution(x, np.inf)
     for name, strategy in applicable(starter, t, x, free, quickly=quickly):
         found, holds = first(strategy(starter, t, x, guess, free), x)
@@ -239,15 +254,19 @@ def _explain(starter: Starter, t: float, guess: Floats, free: Mask, best: Soluti
     """Why there is no consistent state: rows in the way, and the fixed values that would have to move; flat: of laws
     without a slope.
     """
+    # a law without slope: the likeliest reason
     if flat.size:
         return InconsistentStart("slope", float(best.residual), labels(starter.system, flat))
+    # rows that are no numbers at the guess
     if not np.isfinite(best.residual):
         bad = np.flatnonzero(~np.isfinite(starter.residual(t, guess)))
         rows = tuple(starter.settled.row_label(int(row)) for row in bad[:5])
         return InconsistentStart("nonfinite", float("inf"), rows)
     starter.work = Work(EXPLAINED, starter.work.budget)
+    # rows that are linear and contradict: these alone
     x, linear = best.x, contradicting(starter, t, guess, free)
     every = starter.every if linear is None else linear
+    # where they are least, if the model is small
     if x.size <= DENSE:
         x = least_residual(problem_of(starter, t, guess, guess, rows=every, free=free), x)
     scaled = np.abs(starter.residual(t, x)) * starter.row_scale(t, x, starter.scale(t, guess))
@@ -259,6 +278,7 @@ def _explain(starter: Starter, t: float, guess: Floats, free: Mask, best: Soluti
     candidates: tuple[RowLabel, ...] = ()
     # rows that hold to round-off at some point contradict nothing: it was the search that failed
     contradict = bool(scaled[order[0]] > OWN)
+    # fixed values that would have to move, the farthest first
     if found and contradict:
         scale = np.maximum(starter.scale(t, freed.x), starter.scale(t, guess))
         change = np.where(starter.free, 0.0, np.abs(freed.x - guess) / scale)
@@ -266,6 +286,7 @@ def _explain(starter: Starter, t: float, guess: Floats, free: Mask, best: Soluti
         places = [int(k) for k in np.argsort(-change)[:5] if change[k] > least]
         candidates = tuple(dict.fromkeys(starter.label(k) for k in places))
     kind = "fixed"
+    # no fixed value is in the way
     if not candidates:
         kind = "gamma" if rows and rows[0].kind.startswith("gamma") else "stuck"
         if contradict and rows and rows[0].kind.startswith(("phi", "psi", "initial")):
@@ -277,8 +298,10 @@ def _freed(starter: Starter, t: float, guess: Floats, free: Mask, linear: Mask |
     """The nearest point at which all rows hold, or those linear ones that contradict, were nothing fixed; whether it is
     one.
     """
+    # nothing is fixed
     if free.all():
         return Solution(guess, np.inf), False
+    # as a start without fixed values
     if linear is None:
         found, strategy = _attempt(starter, t, guess, np.ones_like(free))
         return found, bool(strategy)
@@ -290,11 +313,13 @@ def _flat(starter: Starter, t: float, guess: Floats, free: Mask) -> Ints:
     """Rows, of the system, of laws without a slope where the rows as written hold, near the guess; none where these
     hold nowhere.
     """
+    # of large models nothing is said of slopes
     if guess.size > DENSE:
         return np.zeros(0, dtype=np.int64)
     starter.work = Work(EXPLAINED, starter.work.budget)
     rows, follows = without_rates(starter), free & starter.following(t, guess)
     moved = ((x, free) for x in itertools.chain([guess], around(starter, t, guess, free)))
+    # the guess, points around, and beside laws that are flat
     for x, may in itertools.chain(off_the_flat(starter, t, guess, follows), moved):
         found = solve(problem_of(starter, t, x, guess, rows=rows, free=may), x)
         if found.residual < EXACT:
@@ -326,9 +351,11 @@ def consistent_start(
     """
     starter = Starter(system if system.form.name == "3" else system.another("3"))
     system = starter.system
+    # constants follow from the start: their rows are left out
     if constants:
         integrated, places = _integrated(starter)
         starter.every[integrated] = False
+    # switches that ask for nothing
     if without:
         rows, _, numbers, _ = switch_rows(system.description, starter.settled.form)
         starter.every[rows[np.isin(numbers, without)]] = False
@@ -343,6 +370,7 @@ def consistent_start(
         raise SolverFailure("max_wall", t0, 0.0) from error
     except NotFiniteError as error:
         raise InconsistentStart("nonfinite", float("inf")) from error
+    # constants take up what their rows miss
     if constants:
         system.description.p[places] += starter.residual(t0, best.x)[integrated]
     found = _state(starter, t0, guess if near is None else _aimed(starter, t0), best, strategy)
@@ -373,15 +401,18 @@ def _sought(starter: Starter, t: float, guess: Floats, *, quickly: bool, silent:
     """The solution, and the strategy that found it; where there is none rates of laws without a slope are not asked for
     either, and the search begins anew.  InconsistentStart.
     """
+    # a set among others whose linear rows contradict
     if silent and not starter.jumping and no_start(starter, t, guess, starter.free):
         raise InconsistentStart("stuck", float("inf"))
     budget = starter.work.budget
     best, strategy = _attempt(starter, t, guess, starter.free, quickly=quickly)
     if strategy:
         return best, strategy
+    # quickly: no word why
     if quickly or starter.jumping:
         raise InconsistentStart("stuck", best.residual)
     flat = _flat(starter, t, guess, starter.free)
+    # without rates of laws that have no slope
     if unasked(starter, flat):
         starter.work = Work(budget=budget)
         best, strategy = _attempt(starter, t, guess, starter.free)
@@ -397,9 +428,11 @@ def _state(starter: Starter, t: float, guess: Floats, best: Solution, strategy: 
     state = starter.free & ~starter.following(t, best.x)
     kept = bool((np.abs(best.x - guess) <= EXACT * largest)[state].all())
     far: tuple[float, ...] = ()
+    # how far it is from the guess, by what moves least
     if not kept and best.x.size <= DENSE:
         measure = problem_of(starter, t, guess, guess, rows=starter.every, free=starter.free, least=True)
         far = measure.distances(best.x)
+    # round-off of zeros
     small = ((np.abs(best.x) <= EXACT * largest) & ~starter.pinned)[: starter.system.form.written]
     zeros = Stretches(small) if small.size > LARGE else small
     del largest, small  # of a large model the room counts

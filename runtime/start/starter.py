@@ -52,7 +52,9 @@ def remembered(
 
     @functools.wraps(ask)
     def answer(self: Starter, t: float, x: Floats) -> NDArray[Any]:
+        # of a large point its digest
         here = t, sha256(np.ascontiguousarray(x).data).digest() if x.size > LARGE else x.tobytes()
+        # another point: nothing is known of it
         if here != self.here:
             self.here = here
             self.known.clear()
@@ -82,6 +84,7 @@ class Starter:
         if system.unknowns > LARGE:  # found again where it is asked
             system.put_away(whole=True)
         values, fixed, written = statements(settled.form.at, settled.unknowns, settled.description.initial)
+        # fixed values of one unknown must agree
         self._agreeing(values)
         self.equations = known = system.once(EQUATIONS, lambda: Equations(system, settled))
         self.core = settled.own(EQUATIONS, lambda: known.core(system, settled))
@@ -93,11 +96,13 @@ class Starter:
         self.guess = np.append(values, np.zeros(self.rates.size))
         self.free = np.append(~fixed, np.ones(self.rates.size, dtype=bool))
         self.written = np.append(written | settled.are("slack"), np.zeros(self.rates.size, dtype=bool))
+        # rates of inertia are unknown at a start
         self.every = ~known.unsettled  # rows that must hold
         self.rows, self.columns = known.rows, known.columns
         unsettled = np.flatnonzero(known.unsettled)
         self._sums = Sums(self._floating(unsettled), unsettled, (known.rows, known.columns), known.unknowns)
         self.every[self._sums.places] = True
+        # sums of these in which no rate is left are rows too
         if self.summed:
             self.rows, self.columns = np.append(self.rows, self._sums.rows), np.append(self.columns, self._sums.columns)
 
@@ -114,6 +119,7 @@ class Starter:
         """InconsistentStart where two fixed ones differ; values [unknowns of y]: those that count."""
         for item, own in (pair for pair in self._said() if pair[0].fixed):
             apart = np.abs(values[own] - item.values)
+            # two fixed values of one unknown that differ
             wrong = np.flatnonzero(apart > 1e-12 * np.maximum(np.abs(values[own]), np.abs(item.values)))
             if wrong.size:
                 place = int(own[wrong[0]])
@@ -151,6 +157,7 @@ class Starter:
     @functools.cached_property
     def hollow(self) -> Mask:
         """Displacements in constraints alone, of which nothing is said: no store holds them [unknowns]."""
+        # no value given, and in constraints alone
         form, known = self.system.form, self.equations
         found = np.zeros(known.unknowns, dtype=bool)
         found[form.k_q] = ~self.written[form.k_q]
@@ -162,6 +169,7 @@ class Starter:
         y, yd = x[: self.n].copy(), np.zeros(self.n)
         yd[self.rates] = x[self.n :]
         form = self.system.form
+        # q' is the flow
         yd[form.k_q] = y[form.k_f]
         return y[: form.written], yd[: form.written]
 
@@ -171,6 +179,7 @@ class Starter:
         """
         x = np.concatenate([y, self.guess[y.size : self.n], yd[self.rates]])
         at = np.flatnonzero((self.moves("start") & self.free)[self.columns])
+        # positions by the contents that they hold
         if at.size:
             aim = np.where(np.isin(np.arange(self.settled.rows), self.rows[at]), -self.residual(t, x), 0.0)
             entries = self.rows[at], self.columns[at] - y.size, self.jacobian(t, x)[at]
@@ -197,6 +206,7 @@ class Starter:
 
     def _ask(self, function: Any, t: float, x: Floats, answer: Floats) -> None:
         """What the core says of the rows at x."""
+        # C reads arrays without gaps
         x = np.ascontiguousarray(x, dtype=np.float64)
         if function(c.addressof(self.core), t, lib.pointer(x), lib.pointer(answer)):
             raise MemoryError
@@ -220,6 +230,7 @@ class Starter:
         """
         known, size = self.equations, np.zeros(self.settled.rows)
         add_sizes(known.rows, known.columns, self._slopes(t, x), np.maximum(scale, np.abs(x)), size)
+        # sums may cancel: by what is summed
         if self.summed:
             self._sums.put(size, sizes=True)
         size[~(size > 0.0)] = 1.0
@@ -288,12 +299,15 @@ class Starter:
         They are taken from the inertia at two points: what moves with the state is left out.
         """
         settled = self.settled
+        # nothing is unsettled, or too large and not joined
         if not unsettled.size or (self.n > DENSE and not self.equations.joined.any()):
             return weights(np.zeros((0, unsettled.size)))
+        # inertia at two points
         points = [self._inertia(shift) for shift in (0.0, 0.1)]
         number = np.cumsum(settled.are("f")) - 1
         own = own_unknown(settled, "dynamics_rate", "f")[unsettled]
         own = np.where(own >= 0, number[own], -1)
+        # of a large model groups that inertia joins
         if self.n > DENSE:
             return of_many(points, own, DENSE)
         whole = np.arange(points[0].size)[None]
@@ -314,12 +328,14 @@ class Starter:
         it too, the momentum in any case.
         """
         jyd = self.system.slopes(t, *self.expand(x), rate=True)
+        # of the state: what has a rate, what is written, no measuring content
         state = self.settled.are(*STATE)
         carries = state & ~self.measured
         carries[: self.system.unknowns] &= self.system.differential(jyd)
         carries |= self.written[: self.n] & state
         carries &= ~self.equations.told
         flow, momentum, written = self._flow, self._momentum, self.written
+        # momentum or flow carries the state, not both
         carries[flow[~written[flow]]] = False
         carries[momentum[written[flow] & ~self.equations.joined[flow]]] = False
         found = np.ones(x.size, dtype=bool)
@@ -349,6 +365,7 @@ class Starter:
         """Holds of the state what drifts: behind a step [unknowns as written] twice as far as behind one of half its
         length and more, where what jumps is as far.
         """
+        # how far a step, and half of it, moves each unknown
         far, near = (self.unknowns(t, y, np.zeros(y.size)) - self.guess for y in behind)
         size = self.largest_alike(np.abs(self.guess) + np.abs(far))
         drifts = (near * np.sign(far) <= DRIFT * np.abs(far)) | (np.abs(far) <= NOISE * size)

@@ -81,6 +81,7 @@ def _newton(starter: Starter, t: float, x: Floats, guess: Floats, free: Mask) ->
     the rest with its first step.
     """
     follows, nearly = free & starter.following(t, x), False
+    # states that may be held, until one nearly does
     for begun in _states(starter, t, x, guess, free, follows):
         with starter.granted(STRAIGHT_ON):
             found, nearly = following(starter, t, begun, guess, free, follows)
@@ -89,10 +90,12 @@ def _newton(starter: Starter, t: float, x: Floats, guess: Floats, free: Mask) ->
         yield (found, exact) if near is None else (near, True)
         if nearly:
             break
+    # what jumps, by corrections of all rows
     if starter.jumping and (near := _by_corrections(starter, t, Solution(x, 0.0), free)) is not None:
         yield near, True
     if not nearly:
         return
+    # everything at once, from what nearly holds
     everything, holds = next(_moved(starter, t, x, guess, free))
     if x.size <= DENSE:
         moved = np.abs(everything.x - found.x) > OWN * starter.largest_alike(starter.scale(t, found.x))
@@ -115,12 +118,14 @@ def _states(starter: Starter, t: float, x: Floats, guess: Floats, free: Mask, fo
     another state.  A long chain is pulled straight at once.
     """
     small, near = x.size <= DENSE, x
+    # the rows of the state alone do not hold: onto them first
     if _beyond(starter, t, x, follows):
         found = _on_its_rows(starter, t, x, guess, free & ~follows, follows) if small else None
         if found is not None:
             yield (near := found)
     else:
         yield x
+    # then by rows without rates
     if small and not starter.jumping:
         *_, (near, _) = (near, free), *off_the_flat(starter, t, near, follows)
         with starter.granted():
@@ -133,9 +138,11 @@ def _states(starter: Starter, t: float, x: Floats, guess: Floats, free: Mask, fo
 
 def _by_corrections(starter: Starter, t: float, found: Solution, free: Mask) -> Solution | None:
     """What is free as all rows determine it; None where they do not, or the problem is no small one."""
+    # large, or no numbers
     if found.x.size > CORRECTED or not np.isfinite(found.residual):
         return None
     near = by_corrections(starter, t, found.x, starter.every, free, partly=True)
+    # no correction, or rows that do not hold to round-off
     if near.x is found.x or not near.holds or not (residual := own_residual(starter, t, near.x, near.x)) < OWN:
         return None
     return Solution(near.x, residual)
@@ -147,6 +154,7 @@ def _completed(starter: Starter, t: float, x: Floats, guess: Floats, free: Mask)
     """
     x, sized = x.copy(), starter.without_noise(x, starter.scale(t, x))  # what round-off left is no magnitude
     x[starter.n :] = sized[starter.n :] = guess[starter.n :]
+    # the state is as guessed: rates alone
     if (x == guess)[free & ~starter.following(t, x)].all():
         rates = free & (np.arange(x.size) >= starter.n)
         found, holds = rescaled(starter, t, x, x, rates, least=False, sized=sized)
@@ -165,16 +173,17 @@ def _faded_out(starter: Starter, t: float, x: Floats, guess: Floats, free: Mask)
 
 
 def _risen(starter: Starter, t: float, x: Floats, guess: Floats, free: Mask) -> Tries:
-    """The same from nothing, where sources and what stores hold rise (source stepping: Nagel 1975): at rest no law is
-    steep.
+    """What the homotopy leads to from nothing, where sources and what stores hold rise (source stepping: Nagel 1975):
+    at rest no law is steep.
     """
+    # at rest already: no source to rise
     if x.any() and (follows := _following_from(starter, t, x, free)) is not None:
         yield from _along(starter, t, (np.zeros_like(x), x), guess, follows)
 
 
 def _between(starter: Starter, t: float, x: Floats, guess: Floats, free: Mask) -> Tries:
-    """The same from where flows of which nothing is said are between those beside them: a node guessed at 0 V below one
-    at 400 V lies where no slope of a junction is left, or beyond the largest number.
+    """What the homotopy leads to from where flows of which nothing is said are between those beside them: a node
+    guessed at 0 V below one at 400 V lies where no slope of a junction is left, or beyond the largest number.
     """
     follows = _following_from(starter, t, x, free)
     near = None if follows is None else _evened(starter, t, x, follows)
@@ -196,6 +205,7 @@ def _following_from(starter: Starter, t: float, x: Floats, free: Mask) -> Mask |
 
 def _along(starter: Starter, t: float, way: tuple[Floats, Floats], guess: Floats, free: Mask) -> Tries:
     """What the homotopy leads to, by all rows; with work of its own."""
+    # with work of its own, then all rows
     with starter.granted(ALONG):
         end = _at_the_end(starter, t, way, free)
         found = None if end is None else _completed(starter, t, end, guess, free)
@@ -210,8 +220,10 @@ def _at_the_end(starter: Starter, t: float, way: tuple[Floats, Floats], free: Ma
     (at, end), rows = way, without_rates(starter)
     begun, free, miss, done, part = at, free & starter.read(rows), starter.residual(t, at), 0.0, FIRST_PART
     grows = True  # but for the first part behind one that did not lead on
+    # no numbers at the begin
     if not np.isfinite(miss[rows]).all():
         return None
+    # parts that double, and halve where Newton's method fails
     while done < 1.0 and part > LEAST_PART and not starter.work.done:
         to = min(done + part, 1.0)
         drawn = np.where(free, at, begun + to * (end - begun))
@@ -235,6 +247,7 @@ def _followed(
     not get there.
     """
     rows, free = what
+    # magnitudes anew until the rows hold in their own
     for _ in range(RESCALINGS):
         problem = replace(problem_of(starter, t, x, x, rows=rows, free=free), residual=left, core=None)
         found = solve(problem, x, FOLLOWED)
@@ -252,6 +265,7 @@ def _evened(starter: Starter, t: float, x: Floats, free: Mask) -> Floats | None:
     size between all nodes would have them), subject to rows that say flows; None where that changes nothing.
     """
     flows, own = starter.moves("f"), own_unknown(starter.settled, "dynamics", "f")
+    # flows without a value, beside each other in balances
     unsaid, alike = flows & free & ~starter.written, starter.equations.alike
     one, other = own[starter.rows], starter.columns
     pairs = (one >= 0) & flows[other] & (one != other) & (alike[one] == alike[other])
@@ -267,6 +281,7 @@ def _evened(starter: Starter, t: float, x: Floats, free: Mask) -> Floats | None:
     j = np.concatenate([one, beside[inner], column, row])
     v: Floats = np.concatenate([np.ones(one.size), -np.ones(int(inner.sum())), values, values])
     aim: Floats = np.append(np.bincount(one, apart, size), -starter.residual(t, x)[saying])
+    # nothing to even out, or no numbers
     if not (one.size and aim.any() and np.isfinite(v).all() and np.isfinite(aim).all()):
         return None
     near = x.copy()
@@ -306,6 +321,7 @@ def applicable(
     linear rows contradict.  quickly: Newton's method alone.
     """
     bent = False
+    # beyond Newton's method only where some law bends
     for k, (name, strategy) in enumerate(STRATEGIES):
         if k == 1 and not quickly:  # slopes of steep laws underflow
             bent = bool(starter.settled.form.scales) or bool(_bent(starter, t, x).any())
@@ -318,6 +334,7 @@ def behind(starter: Starter, t: float, x: Floats, free: Mask) -> Floats | None:
     """A point behind a jump at which all rows hold that must, from x; None where none was found.  A step of 10 V across
     a diode makes steep laws lie far behind it.
     """
+    # ways as at a start
     ways = [way for _, way in applicable(starter, t, x, free)]
     with np.errstate(all="ignore"):  # an exponential may be beyond the largest number on the way, where nothing holds
         found, holds = first((found for way in ways for found in way(starter, t, x, x, free)), x)

@@ -47,6 +47,7 @@ class Sums:
         self.weights, self.summed = weights, summed
         self.places = summed[: weights.number]
         self.rows = self.columns = np.zeros(0, dtype=np.int64)
+        # nothing is summed
         if not self.places.size:
             return
         place = np.full(int(max(entries[0].max(), summed.max())) + 1, -1)
@@ -54,11 +55,13 @@ class Sums:
         row = place[entries[0]]
         self._mine = np.flatnonzero(row >= 0)
         self._mine = self._mine[np.argsort(row[self._mine], kind="stable")]
+        # entries of the rows that are summed
         begin = np.searchsorted(row[self._mine], np.arange(summed.size + 1))
         number = np.diff(begin)[weights.row]
         of = np.repeat(np.arange(weights.row.size), number)
         within = np.arange(of.size) - np.repeat(np.cumsum(number) - number, number)
         self._entry, self._weight = self._mine[begin[weights.row][of] + within], weights.value[of]
+        # entries of one sum at one unknown are one
         key = weights.sum[of].astype(np.int64) * unknowns + entries[1][self._entry]
         keys, self._slot = np.unique(key, return_inverse=True)
         self.rows, self.columns = self.places[keys // unknowns], keys % unknowns
@@ -75,6 +78,7 @@ class Sums:
         """Values of what is summed with those of the sums behind them; of summed rows by themselves none are left."""
         terms = self._weight * values[self._entry]
         own, size = (np.bincount(self._slot, of, minlength=self.rows.size) for of in (terms, np.abs(terms)))
+        # sums that cancel are zero
         own[np.abs(own) <= CANCELS * size] = 0.0
         alone = values.copy()
         alone[self._mine] = 0.0
@@ -83,6 +87,7 @@ class Sums:
     def put(self, values: Floats, *, sizes: bool = False) -> None:
         """The sums of values [rows] or [rows, k] in their places; sizes: of magnitudes, which do not cancel."""
         own, add = self.weights, add_sizes if sizes else add_product
+        # by columns, in place
         for column in np.atleast_2d(values.T):
             column[self.places] = add(own.sum, own.row, own.value, column[self.summed], np.zeros(own.number))
 
@@ -95,15 +100,17 @@ def _scaled(matrix: Floats) -> Floats:
 
 def of_few(matrix: Floats) -> Weights:
     """Sums [k, rows] of the rows of a full matrix of inertia that are nothing."""
+    # no numbers: no sums
     if not np.isfinite(matrix).all():
         return weights(np.zeros((0, len(matrix))))
     return weights(null_space(_scaled(matrix).T).T)
 
 
 def of_many(points: list[Inertia], own: Places, most: int) -> Weights:
-    """The same of flows that inertia joins in groups, each at most `most` large; of larger ones the plain sum if it is
-    one.  points: inertia at several points; own [rows]: the flow whose balance a row is, or -1.
+    """Sums of rows that are nothing, of flows that inertia joins in groups, each at most `most` large; of larger ones
+    the plain sum if it is one. points: inertia at several points; own [rows]: the flow whose balance a row is, or -1.
     """
+    # groups of flows that stores join
     number = points[0].size
     joined = np.hstack([np.tile(np.arange(number), (2, 1)), *(point.joined_pairs() for point in points)])
     label = components(joined[0], joined[1], number)
@@ -112,6 +119,7 @@ def of_many(points: list[Inertia], own: Places, most: int) -> Weights:
     order = np.argsort(label, kind="stable")
     begin = np.append(np.flatnonzero(np.diff(label[order], prepend=-1)), number)
     size = np.diff(begin)
+    # groups of one size at once
     found: list[tuple[Places, Floats]] = []
     for s in np.unique(size[(size > 1) & (size <= most)]):
         members = order[begin[:-1][size == s][:, None] + np.arange(s)]
@@ -120,6 +128,7 @@ def of_many(points: list[Inertia], own: Places, most: int) -> Weights:
         members, blocks = (item[np.isfinite(blocks).all(axis=(1, 2))] for item in (members, blocks))
         group, vectors = left_null_vectors(_scaled(blocks))
         found += zip(place[members[group]], vectors, strict=True)
+    # of a large group the plain sum, if it is one
     for c in np.flatnonzero(size > most):
         members = order[begin[c] : begin[c + 1]]
         if (place[members] >= 0).all() and all(point.cancels(members) for point in points):

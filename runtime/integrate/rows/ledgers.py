@@ -146,6 +146,7 @@ class Ledgers:
         return tuple(self._balance(k, *found) for k, found in enumerate(zip(self.stored, risen, strict=True)))
 
     def _balance(self, k: int, stored: float, records: list[tuple[float, float]]) -> LedgerBalance:
+        """What came of ledger k: stored at most, instants and values (t, value) at which its balance rose."""
         label, unit, first = self._heads[k]
         kind, _, title = label.partition(": ")
         # passed and stored: what the balance is relative to

@@ -76,6 +76,7 @@ class Sizes:
 
     def _bring_back(self) -> None:
         # nothing is away
+        """Makes the sizes of all unknowns whole again, where `put_away` has let go of them."""
         if self._away is None or self._own is None:
             return
         (other, *others), (kept, magnitude, met) = self._away, self._own
