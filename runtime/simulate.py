@@ -67,7 +67,6 @@ class Outcome:
     @property
     def traced(self) -> Trace:
         """The trace, read from its file or as it is held."""
-        # in memory
         if self.held is not None:
             return self.held
         assert self.trace is not None
@@ -83,7 +82,6 @@ def without_redundant(
     written: System, start: ConsistentState, facts: Structure, options: Options
 ) -> tuple[System, ConsistentState, Structure]:
     """The model as written without the redundant constraints that the options leave out."""
-    # words of the option
     if options.redundancy not in ("error", "drop", "minimum_norm"):
         raise WrongOption(f"redundancy {options.redundancy}: error, drop or minimum_norm")
     # dependent constraints: left out, or followed as the motion turns them
@@ -204,7 +202,6 @@ def _runs(runs: Runs, others: tuple[Way, ...], written: System, facts: Structure
         some = "1 row does" if finished.unsettled == 1 else f"{finished.unsettled} rows do"
         warnings = (*warnings, f"{some} not meet the equations: what stands there is the integrator's own")
     warnings += tuple(_floating(finished.open, written.description))
-    # terms that cancel, offsets
     estimate = achieved.error_estimate if achieved is not None else None
     ranges = {name: moves for name, moves in writer.ranges().items() if name not in options.to_range}
     terms = runs.quantities.terms(finished.largest)
@@ -228,7 +225,6 @@ def _floating(open_: Mapping[int, tuple[str, ...]], description: Description) ->
 
 def _extrema(runs: Runs) -> dict[str, tuple[float, float]]:
     """Within the steps of a run, by traced name; nothing where they were not asked for."""
-    # not asked for
     if runs.done is None or runs.done[0].extrema is None:
         return {}
     least, most = runs.done[0].extrema
@@ -237,7 +233,6 @@ def _extrema(runs: Runs) -> dict[str, tuple[float, float]]:
 
 def close(runs: Runs, achieved: Achieved | None, judgement: Judgement | None) -> None:
     """Last attributes of the finished run that stands at the path; judgement None: it did not end as asked."""
-    # nothing to close
     if runs.done is None or runs.done[2].closed:
         return
     finished, _, writer = runs.done

@@ -40,7 +40,6 @@ def alternatives(way: Way, written: System, start: ConsistentState, options: Opt
     The explicit method on the underlying equation comes first where there is one and no law is steep: it is by far the
     cheapest on a model that is not stiff, and gives up in a few steps on one that is.
     """
-    # the other implicit method
     other = replace(way, method="bdf" if way.method == "radau" else "radau")
     # rtol or atol given: no accuracy to choose a method by
     if own_tolerances(options):

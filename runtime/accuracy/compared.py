@@ -240,7 +240,6 @@ class RunComparison:
 
     def _nominals_and_excuse(self, finished: Finished, quantities: Quantities) -> tuple[Floats, Floats]:
         """Nominal value of each compared quantity, and how much of it may be excused."""
-        # once a run
         if self._sized is None or self._sized[0] is not finished:
             self._sized = finished, self._nominal(finished, quantities)
         nominal = self._sized[1]

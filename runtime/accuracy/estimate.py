@@ -149,7 +149,6 @@ class ErrorEstimate:
         """Takes the pair in; returns the plain difference.  shorter: the longest step of the finer over that of the
         coarser run, where it holds both.
         """
-        # decades between the tolerances
         step = float(np.log10(coarse.tolerance / fine.tolerance))
         apart, over = difference(coarse, fine, self.target)
         # what comes to rest at zero has an error of its own

@@ -85,7 +85,6 @@ def distance_of_runs(coarse: RunSample, fine: RunSample) -> Floats:
     far it moves meanwhile, and all that is more than the jump.
     """
     values, late = coarse.own
-    # rates that are no numbers give no time tolerance
     late = np.minimum(np.fmax(np.fmax(late, fine.late), 0.0), LARGEST)  # no number: no time tolerance
     over = np.fmax(_outside(values, fine.values, late), _outside(fine.values, values, late))
     over = np.fmax(over, 0.0 * fine.values * values)
@@ -154,7 +153,6 @@ def difference(coarse: RunSample, fine: RunSample, target: Floats) -> tuple[floa
     # quantities of size zero, or of which nothing is asked, do not count
     size = fine.largest
     use = (size != 0.0) & np.isfinite(target)  # sizes that are no numbers are used: they are not met
-    # nothing to compare
     if not use.any() or not fine.values.size:
         return 0.0, 0.0
     before = coarse.own[0]
@@ -178,7 +176,6 @@ def before_fronts(coarse: RunSample, fine: RunSample, target: Floats) -> tuple[f
     """How far two runs are apart, relative, and that over the accuracy wanted, where the coarser one passes over a
     front in one step.
     """
-    # no front
     if fine.front is None or not fine.front.any():
         return 0.0, 0.0
     use = _has_size(coarse, fine, target)
@@ -227,7 +224,6 @@ def left_at_rest(coarse: RunSample, fine: RunSample, target: Floats, *, known: b
     if not use.any():
         return 0.0, 0.0
     with np.errstate(all="ignore"):
-        # over what was asked
         far = distance_of_runs(coarse, fine)[:, use]
         over = far / (size * target)[use]
     # runs that agree, or are no numbers

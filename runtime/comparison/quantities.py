@@ -197,7 +197,6 @@ def _curves(
 
 def _block(state: _State, curves: tuple[Curve, Curve], cells: tuple[Ints, Ints], block: _Block, tau: float) -> None:
     """Cells of one block: the largest difference, then the tube where it is beyond the limit."""
-    # nothing in common
     if not block.left.size:
         return
     pieces = [
@@ -335,7 +334,6 @@ def _undefined_quantity(state: _State, time: float, note: str) -> None:
 def _nonfinite(state: _State, curves: tuple[Curve, Curve], tau: float) -> None:
     """Each row that is no number has one of the same kind at the same instant in the other trace."""
     kinds = [_kinds(curve.values) for curve in curves]
-    # numbers everywhere
     if not (kinds[0].any() or kinds[1].any()):
         return
     # each trace against the other

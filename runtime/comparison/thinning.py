@@ -40,7 +40,6 @@ def thin_rows(curves: Sequence[Curve], limits: Floats, kept_as: Sequence[Curve] 
     # divide and conquer: a stretch is one cubic, or is cut where that is worst
     while waiting:
         a, b = waiting.pop()
-        # no row between
         if b - a < 2:
             continue
         part = slice(row[a], row[b])
@@ -70,7 +69,6 @@ def estimated_rates(time: Floats, values: Floats, limit: float) -> Floats:
 
     NaN (a line) where the cubic that follows from them leaves the line between two rows by more than the limit.
     """
-    # no parabola
     if time.size < 3:
         return np.full(time.size, np.nan)
     with np.errstate(divide="ignore", invalid="ignore"):

@@ -173,7 +173,6 @@ class CondensedSystem:
 
     def _products(self, terms: Composition) -> Ints:
         """Which entries of the whole matrix add to this one with what factor; the column of each such product."""
-        # entries of kept rows
         system, found = self.whole, self.sums
         kept = np.zeros(system.rows, dtype=bool)
         kept[self.kept_rows] = True

@@ -243,7 +243,6 @@ class Determined:
                 return self.pivoting.fit(t, *point, settle)
             except NoActiveSetError:
                 return None
-        # this very set
         found = settle(t, *point)
         if found is None or not self.contacts.fits(t, point[0], found):
             return None

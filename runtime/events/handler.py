@@ -328,7 +328,6 @@ class Handler(Watching):
         """The point after the conditions that became true where the constraints were found anew."""
         for _ in range(CASCADE):
             fired = self._risen(())
-            # no condition became true
             if not fired:
                 return point
             self.simple, self.struck, said = False, -1, self.contacts.standing()
@@ -491,7 +490,6 @@ class Handler(Watching):
         # too many without time passing: laws alone, or all
         if self.stalled > STALLED:
             raise SolverFailure("fold" if self._turns_alone() else "chatter", t, 0.0, self._names())
-        # the user's limit
         if self.plan.limit is not None and len(self.happened) > self.plan.limit:
             raise SolverFailure("max_events", t, 0.0, self._names())
 

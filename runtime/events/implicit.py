@@ -92,7 +92,6 @@ class Implicit:
         if turned is None:  # of values that are round-off one may seem to be less than zero
             terms = np.abs(end) + np.abs(told) @ np.abs(moves[:, -1])
             turned = lemke(slopes, np.where(np.abs(begin) <= ROUND_OFF * terms, 0.0, begin) / size)
-        # no solution
         if turned is None:
             return None
         active = contacts.active.copy()
@@ -137,7 +136,6 @@ def base_of(
     while True:
         matrix[row], right[row, -1] = np.where(held[:, None], slope, unit), -np.where(held, value, multiplier)
         found, open_ = _solve_graded(matrix, right)
-        # regular
         if found is not None:
             return found, held
         part = np.where(turned, 0.0, open_[row])
@@ -153,7 +151,6 @@ def _solve_graded(matrix: Floats, right: Floats) -> tuple[Floats | None, Floats]
     much each row [rows] has to do with that.
     """
     row, column = (factor[:, None] for factor in factors(matrix))
-    # equilibrated
     even = row * matrix * column.T
     # singular: its left null vector says by which rows
     left, sigma, _ = singular_decomposition(even)

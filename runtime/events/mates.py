@@ -88,7 +88,6 @@ class _Search:
             self.system.description.switches.set(active)
             for seed in (0, 1):
                 alike &= self._alike(seed, free, blocks=blocks)
-            # no two alike
             if not np.triu(alike, 1).any():
                 return False
         number = np.flatnonzero(free)
@@ -109,12 +108,9 @@ class _Search:
         none = np.zeros(len(self.system.description.switches.places), dtype=bool)
         other = ~none
         other[asked] = False
-        # nothing else holds
         yield none.copy()
-        # all else holds
         if other.any():
             yield other.copy()
-            # each by itself
             for k in np.flatnonzero(other):
                 none[k] = True
                 yield none.copy()
@@ -169,7 +165,6 @@ def _null_span(vectors: Floats, rows: Mask) -> Floats:
 
 def _pairs(vectors: Floats) -> NDArray[np.bool_]:
     """Which e_k - e_l lie in the span of columns [items, number]."""
-    # an empty span
     if not vectors.shape[1]:
         return np.zeros((vectors.shape[0],) * 2, dtype=bool)
     basis, size, _ = singular_decomposition(vectors)

@@ -82,7 +82,6 @@ class Pivoting:
             return found
         self.contacts.active[:], self.contacts.p[:] = before
         self.contacts.reversed.clear()
-        # then all contacts
         try:
             return self._pivot(t, y, yd, settle, turned)
         except NoActiveSetError:
@@ -169,7 +168,6 @@ class Pivoting:
             values = self.contacts.observer(t, found[0], found[1])
             struck = self.contacts.impulses(y, found)
             wrong = sorted({*self.contacts.wrongs(values, struck), *self.contacts.backwards(t, y, found)})
-            # complementary
             if not wrong:
                 return found[0], found[1]
             if again:  # driven back by either sense: it does not go through where other constraints hold than before

@@ -110,7 +110,6 @@ class Succession:
         """Value and rate of a friction that slips in the sense 1, and -1; fewer where there is no such point."""
         contacts, contact = self.contacts, self.contacts.contacts[k]
         ends, stood = list[Floats](), contacts.state()
-        # in either sense
         for sense in (1.0, -1.0):
             contacts.slip(k, sense)
             contacts.apply()
@@ -173,7 +172,6 @@ class Succession:
             fits = fits and (bool(touched) or self._is_decided(before[0], self.observer(t, *found[:2])))
             if fits and self.determined.leaves(t, *found[:2]) == 0:
                 return found[0], found[1]
-        # back to what stood
         self.contacts.active[:], self.p[:] = before
         self.contacts.apply()
         return None
@@ -183,7 +181,6 @@ class Succession:
         alike at this instant (a diode that conducts beside a capacitor) stays where nothing touched it.
         """
         active, zero = self.contacts.active, self.observer.zero
-        # inequalities that turned
         turned = [k for k in np.flatnonzero(active != before) if self.plan.contacts[k].kind in ("phi", "psi")]
         held = [self.plan.contacts[k] for k in turned if active[k]]
         open_ = [self.plan.contacts[k] for k in turned if not active[k]]
@@ -197,7 +194,6 @@ class Succession:
         """
         values, zero = self.observer(t, *point), self.observer.zero
         contacts = [self.contacts.contacts[k] for k in touched]
-        # frictions that slip
         stick = self.contacts.active
         slips = [c for c, sticks in zip(self.plan.contacts, stick, strict=True) if c.kind == "friction" and not sticks]
         idle = any(abs(values[c.value]) <= zero(c.value) and abs(values[c.rate]) <= zero(c.rate) for c in slips)

@@ -31,7 +31,6 @@ class Turns:
         active = self._succession.contacts.active
         # frictions that have not been seen acting
         left = {k for k in self._of.values() if k not in self._acting and not active[k]}
-        # none left to watch
         if not left or self._succession.restart is None:
             return
         # one that drives from here on

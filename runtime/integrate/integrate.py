@@ -136,7 +136,6 @@ class Integration:
     @contextmanager
     def room_left(self) -> Iterator[None]:
         """What a large run evaluates its condensed points in goes meanwhile; nothing is evaluated there."""
-        # nothing to let go
         if self.forms is None or self.system.unknowns <= LARGE:
             yield
             return
@@ -347,7 +346,6 @@ class Integration:
             # constraints that depend otherwise: others are left out
             if self.exchange is not None and state in (0, 3) and self.exchange.due(failed=state == 3):
                 continue
-            # the core gave up
             if state == 3:
                 if lib.CAUSES[method.cause] in NEWTON and self._resolve_zeros():
                     continue

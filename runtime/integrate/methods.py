@@ -58,7 +58,6 @@ class Method:
             self._core = lib.core.sd_dopri_new(c.byref(system.core), underlying.core)
         elif name == "rosenbrock":
             self._core = lib.core.sd_rosenbrock_new(c.byref(system.core), linear)
-        # bdf
         else:
             self._core = lib.core.sd_bdf_new(c.byref(system.core), linear)
         if not self._core:

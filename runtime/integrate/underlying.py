@@ -73,7 +73,6 @@ class Names(Sequence[str]):
         return int(self._places.size)
 
     def __getitem__(self, at: Any) -> Any:
-        # names of a part
         if isinstance(at, slice):
             return Names(self._system, self._places[at], self._rate[at])
         return self._system.name(int(self._places[at])) + "'" * int(self._rate[at] > 0)
@@ -205,7 +204,6 @@ class Accelerations:
     def undetermined_unknowns(self, jy: Floats, jyd: Floats) -> Sequence[str]:
         """Unknowns, or x' for their derivatives, that the rows do not determine at a point; none where they do."""
         number = self.pattern.unknowns
-        # nothing to solve for
         if number == 0:
             return ()
         # small and regular: the usual case

@@ -26,7 +26,6 @@ def growth(system: System, rest: ConsistentState) -> tuple[float, str]:
         # a pencil without finite linearisation
         except (NoLinearisation, ArithmeticError, np.linalg.LinAlgError):
             return 0.0, ""
-    # nothing moves
     if not v.shape[1]:
         return 0.0, ""
     # x = v z on the finite motions; E v z' + ... = A v z solved for z'

@@ -76,7 +76,6 @@ def balance_matrix(a: Floats) -> tuple[Floats, Floats]:
 
 def modes(a: Floats, precisely: Decomposed | None = None) -> tuple[Eigenmode, ...]:
     """The modes of x' = a x, by rising real part, then imaginary part; precisely: of a in many digits."""
-    # a model without states
     if not a.size:
         return ()
     # many digits: eigenvectors of both sides are known
@@ -240,7 +239,6 @@ def _zeros(a: Floats, b: Floats, c: Floats, d: float, first: tuple[int, float] |
     # a direct part: zeros of the inverse system
     if d != 0.0:
         return np.linalg.eigvals(a - np.outer(b, c) / d).astype(complex), d
-    # nothing passes at all
     if first is None or first[0] >= b.size:
         return np.zeros(0, complex), 0.0
     # relative degree r + 1: rows c a^k that vanish along zero dynamics

@@ -211,7 +211,6 @@ def widely_parted(matrices: tuple[Floats, ...], groups: tuple[Choice, ...], stat
     if not 0 < states <= precise.MOST or matrices[0].shape[0] > WIDEST:
         return None
     with precise.digits():
-        # singular
         if (powers := _powers(matrices)) is None:
             return None
         # columns that span the motions; states are independent rows of them
@@ -276,7 +275,6 @@ def _parted_widely(matrices: tuple[Floats, ...], chosen: Choice) -> tuple[precis
     c, cd = (part * column for part in (c, cd))
     n, states = matrices[0].shape[0], chosen.size
     if (powers := _powers(matrices)) is None:
-        # a singular pencil
         return None
     m, nu, power = powers
     # any directions reach all motions, but for chance

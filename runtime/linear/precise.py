@@ -109,7 +109,6 @@ def _eliminate(full: Wide, n: int) -> Wide | None:
 def solve(matrix: Wide, aim: Wide) -> Wide | None:
     """X [n, k] of matrix [n, n] X = aim [n, k]; None where the matrix is singular."""
     size = [max((abs(x) for x in row), default=0) for row in matrix]
-    # a row of zeros
     if not all(size):
         return None
     return _eliminate(np.hstack([matrix, aim]) / np.array(size, dtype=object)[:, None], matrix.shape[1])
@@ -319,7 +318,6 @@ def rational(a: Wide, b: Wide, c: Wide, d: Any) -> tuple[Values, Values, float]:
         # leading coefficients that are zero: the relative degree
         while top and abs(top[0]) <= ZERO * largest:
             top = top[1:]
-        # nothing passes
         if not top:
             return np.zeros(0, complex), np.zeros(0, complex), 0.0
         zeros, poles = _roots(top), _roots(below)

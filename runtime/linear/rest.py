@@ -174,7 +174,6 @@ class Resting:
 
     def problem(self, guess: Floats) -> Problem:
         """Rest nearest to a guess."""
-        # magnitudes of the guess
         x = self.starter.unknowns(self.t, guess, np.zeros(self.n))
         scale = self.starter.scale(self.t, x)[: self.n]
         # multipliers and implicit efforts follow: they hardly weigh
@@ -345,7 +344,6 @@ class Resting:
         # in steps along the null space
         for _ in range(PIECES):
             away = ((other - y) / size)[told]
-            # arrived
             if np.abs(away).max(initial=0.0) <= SAME:
                 return True
             null = self._null(y, self.problem(y)) / size[:, None]

@@ -242,7 +242,6 @@ def widely_reduced(given: Given) -> Reduced | None:
     rows, system, loose = given.rows, given.system, given.loose
     starter = rows.starter
     g = rows.jacobian[rows.holds]
-    # too many columns
     if g.shape[1] > WIDEST:
         return None
     known = candidates_of(system, given.state, system.form.written)
@@ -332,7 +331,6 @@ def _moved_widely(g: Floats, right: Floats, chosen: NDArray[np.int64], moves: Fl
     scale: Floats = np.exp2(np.round(np.log2(moves[rest]))).astype(np.float64)
     found = precise.wide(np.zeros((g.shape[1], right.shape[1])))
     solved = precise.eliminate_consistent(g[:, rest] * scale, aim)
-    # not determined
     if solved is None:
         return None
     found[rest] = precise.wide(scale)[:, None] * solved

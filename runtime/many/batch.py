@@ -243,7 +243,6 @@ class Batch:
     def _begin(self) -> None:
         """The start of every run."""
         many, system, made = self.core, self.system, self.passes[1]
-        # the nominal start
         n = system.form.written
         y, yd = (np.ascontiguousarray(item[:n]) for item in (self.start.y, self.start.yd))
         found = anchors(made.settler, system, self.start.t, (y, yd), made.sizes.magnitude)
@@ -385,7 +384,6 @@ class Batch:
         place = {name: k for k, name in enumerate(self.runs.names)}
         made = (lib.RunClaim * max(len(claims), 1))()
         for k, claim in enumerate(claims):
-            # -1: no window
             within = -1 if claim.within is None else place[claim.within]
             moment = {"always": 0, "finally": 1}.get(claim.moment, 2)
             op = ("==", "!=", "<", "<=", ">", ">=").index(claim.operator)

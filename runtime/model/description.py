@@ -86,7 +86,6 @@ Elements = Sequence[tuple[str, str, int]]
 
 def name_of(name: str, shape: Shape, elements: Elements, position: int) -> tuple[str, str, int]:
     """What the element of a family is called, and where it stands ("", 0: where the family does)."""
-    # elements by array arithmetic
     if not elements:
         return element(name, shape, position), "", 0
     # elements with names of their own: `v1#.multiplier`

@@ -114,7 +114,6 @@ class Facts:
             # -1: not in this form
             if family.kind in kinds and 0 <= first < self.unknowns and family.kind != "audit":
                 mask[first : first + family.size] = True
-        # nu stand behind the unknowns as written
         if self.form.name != "start":
             mask[self.form.written :] = "nu" in kinds
         return mask

@@ -229,7 +229,6 @@ def _kinematics(description: Description, at: Ints) -> tuple[Ints, Ints, dict[st
         number += family.size
         places_q.append(np.arange(family.size) + at[k])
         places_f.append(np.arange(family.size) + at[flow])
-    # a model without coordinates
     if not places_q:
         return np.zeros(0, np.int32), np.zeros(0, np.int32), first
     return np.concatenate(places_q).astype(np.int32), np.concatenate(places_f).astype(np.int32), first

@@ -54,7 +54,6 @@ def _rows_of(description: Description, form: Form, places: LeftOut) -> Iterator[
 
 def held_rows(description: Description, form: Form, left_out: LeftOut) -> tuple[Longs, Longs]:
     """Rows, and the unknowns that vanish there."""
-    # of several rows for one multiplier the last one
     own = {} if form.base == "constraints" else {read: group for group, read in _HELD[form.base]}  # the last of each
     found = [(row, at) for _, group, read, row, at in _rows_of(description, form, left_out) if own.get(read) == group]
     table = np.asarray(found, dtype=np.int64).reshape(-1, 2)

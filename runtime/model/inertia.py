@@ -163,7 +163,6 @@ def stored_between(system: System, common: Ints) -> Ints:
     # a rate that stands in another coordinate's balance
     there = system.structural()[1] & (own >= 0) & (own != column)
     there &= (common[own] >= 0) & (common[own] == common[column])
-    # each pair once
     pairs = np.sort(np.stack([own[there], column[there]], axis=1), axis=1)
     return np.unique(pairs, axis=0)
 

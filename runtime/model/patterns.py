@@ -192,7 +192,6 @@ def spared_loops(
 
 def join(parts: Sequence[Places]) -> Places:
     """All parts one behind the other (int32)."""
-    # nothing to join
     if len(parts) == 1:
         return Places(*(np.asarray(item, dtype=np.int32) for item in (parts[0].row, parts[0].column)))
     empty = np.zeros(0, dtype=np.int32)

@@ -165,7 +165,6 @@ def group_maximum(system: System, values: Floats) -> Floats:
 def group_maxima(system: System, values: Floats) -> Floats:
     """Largest absolute value of each kind and unit, by its number in `alike`; zero at least."""
     numbers, families, (first, which) = kinds_and_units(system), system.description.families, system.begins
-    # nu stand behind the unknowns as written
     of = [*(numbers[families[k].kind, families[k].unit] for k in which), len(numbers)]  # nu behind the others
     more = system.unknowns > system.form.written
     begin = np.append(first, np.int32(system.form.written))[: first.size + more]

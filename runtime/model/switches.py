@@ -33,7 +33,6 @@ class Switches:
 
     def set(self, active: NDArray[np.bool_]) -> None:
         """These hold from now on, in every system of the model."""
-        # nothing changes
         if (active == self.active).all():
             return
         self.active = active.copy()

@@ -454,7 +454,6 @@ class System(Facts):
         """Rows [observed] of a block of observers at a point (extended); zeros where the model has no such block."""
         call = self.observer(block)
         number = self.observed_rows(block)[1]
-        # nothing observed
         if call is None:
             return np.zeros(number)
         out = np.zeros(max(number, 1))

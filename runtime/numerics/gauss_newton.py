@@ -106,7 +106,6 @@ class Correction:
 
 def _numbered(places: Any, used: Mask) -> Any:
     """Places by their numbers among those in use."""
-    # all are in use
     if used.all():
         return places
     number = np.cumsum(used, dtype=np.int32)
@@ -316,7 +315,6 @@ def _solve(problem: Problem, x: Floats, most: int) -> Solution:
 
         # where it stands; it ends at round-off, or where nothing has become better for long
         size, scaled = measure(x)
-        # better than before: kept
         if size < best.residual:
             stale = stale if size > 0.5 * best.residual else 0
             best = Solution(x, size)

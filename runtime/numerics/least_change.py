@@ -96,7 +96,6 @@ def least_measured(entries: tuple[Any, Any, Floats], aim: Floats, scale: Floats)
     is zero.  A scale that is no number: in what one unit of it does at most.
     """
     take, x = entries[2] != 0.0, np.zeros(scale.size)
-    # no entries: nothing moves
     if not take.any():
         return x
     (rows, i), (columns, j) = (np.unique(item[take], return_inverse=True) for item in entries[:2])

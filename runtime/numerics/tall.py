@@ -49,7 +49,6 @@ class Columns:
 
     def whole(self, found: Floats, *, rest: float = 0.0) -> Floats:
         """Of all unknowns, `rest` those of columns without entries."""
-        # every column has entries
         if self.used.all():
             return found
         whole = np.full(self.used.size, rest)

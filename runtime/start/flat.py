@@ -60,7 +60,6 @@ def off_the_flat(starter: Starter, t: float, x: Floats, follows: Mask) -> Iterat
     """
     beside = _beside(starter, t, x, follows)
     flat = flat_at(starter, t, x, follows)
-    # no law without slope
     if not flat.any():
         return
     # the other rows hold first; flat laws that are missed then are begun beside
@@ -117,7 +116,6 @@ def bends(starter: Starter, t: float, x: Floats, follows: Mask) -> bool:
 
 def without_flow(starter: Starter, t: float, x: Floats, follows: Mask) -> Mask:
     """Of what follows the flows of laws without a slope at x whose rates are not asked for."""
-    # no row rests
     if not starter.resting.any():
         return np.zeros_like(follows)
     return starter.columns_of(flat_at(starter, t, x, follows) & starter.resting[starter.rows])

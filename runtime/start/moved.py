@@ -47,7 +47,6 @@ def moved_guesses(starter: Starter, t: float, x: Floats, scale: Floats) -> Itera
     guess, missed = starter.guess, starter.moves("slack")
     size = np.where(missed, scale, np.maximum(np.abs(guess), 1e-3 * scale))
     told = starter.written & starter.free & (np.abs(x - guess) > NOTED * size)
-    # every guess is met
     if not told.any():
         return
     values = starter.jacobian(t, x)

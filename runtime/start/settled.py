@@ -148,7 +148,6 @@ def _values_told(
         return False
     n, told, rates = valued.unknowns, rates_of(valued), rates_of(settled)
     wanted = np.zeros(n, dtype=bool)
-    # what rows read
     wanted[settled.pattern.columns_of()[settled.structural()[0]]] = True
     moving = state | np.isin(settled.family_of, list(read))
     open_ = _open(valued, point, state, np.zeros(n, dtype=bool))

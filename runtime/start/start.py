@@ -211,7 +211,6 @@ def _with_contents(starter: Starter, t: float, x: Floats) -> Floats:
     those efforts that balances alone make of what is said.
     """
     efforts, gammas = starter.moves("e"), starter.groups("gamma")
-    # coupled stores: efforts by the balances, then displacements by the efforts
     if (_number(starter, gammas, efforts) > 1).any():  # of coupled stores
         balances = starter.groups("dynamics") & ~starter.reading(np.arange(x.size) >= starter.n)  # no rate in them
         unsaid = starter.moves("e", "f") & starter.free & ~starter.written
@@ -219,7 +218,6 @@ def _with_contents(starter: Starter, t: float, x: Floats) -> Floats:
         _rest(starter, t, found, rows=balances, of=unsaid)
         x = np.where(efforts, found, x)
     told = efforts & (x != 0.0)
-    # no effort is said
     if not told.any():
         return x
     rows = gammas & starter.reading(told)
@@ -298,7 +296,6 @@ def _freed(starter: Starter, t: float, guess: Floats, free: Mask, linear: Mask |
     """The nearest point at which all rows hold, or those linear ones that contradict, were nothing fixed; whether it is
     one.
     """
-    # nothing is fixed
     if free.all():
         return Solution(guess, np.inf), False
     # as a start without fixed values

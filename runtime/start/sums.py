@@ -47,7 +47,6 @@ class Sums:
         self.weights, self.summed = weights, summed
         self.places = summed[: weights.number]
         self.rows = self.columns = np.zeros(0, dtype=np.int64)
-        # nothing is summed
         if not self.places.size:
             return
         place = np.full(int(max(entries[0].max(), summed.max())) + 1, -1)

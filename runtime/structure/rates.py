@@ -42,7 +42,6 @@ def determined_rates(system: System, start: ConsistentState) -> NDArray[np.bool_
     free = ~unique(system, jyd)
     free[with_flows(system)[1]] = False  # functions of the tested momenta
     found = np.ones(system.observed_rows("observe_rate")[1], dtype=bool)
-    # all rates are determined
     if not free.any():
         return found
     # at the state and beside it: with other open rates the same values, or no numbers

@@ -161,7 +161,6 @@ def vanishing_constraints(system: System, state: ConsistentState) -> Ints:
     zero on phi alone (a circle of radius 0) has its size.
     """
     reacting = _reacting(system, system.idle_multipliers())
-    # no constraints
     entry, which, number = reacting.entry, reacting.which, reacting.multipliers.size
     if not number:
         return NONE

@@ -132,7 +132,6 @@ def _regular(matrix: Floats) -> bool:
 def null_place(system: System, jy: Floats, jyd: Floats) -> tuple[tuple[str, ...], int]:
     """Unknowns in the null vectors of dF/dy + cj dF/dyd, () where it is regular; its row."""
     columns, rows = null_vectors(system.dense(jyd), system.dense(jy))
-    # regular
     if not columns.size:
         return (), -1
     null = np.abs(columns).max(axis=1)
@@ -185,7 +184,6 @@ def _growth(linear: Any, jy: Floats, jyd: tuple[Ints, Floats], rate: float) -> i
         values[:] = jy
         values[moving] += cj * rates
         size, pivot = _inverse(linear, values)
-        # singular there
         if not (np.isfinite(size) and size > 0.0):
             return None
         least = min(least, pivot)
@@ -201,7 +199,6 @@ def _inverse(linear: Any, values: Floats) -> tuple[float, float]:
     if lib.core.sd_linear_factor(linear, lib.pointer(values), None):
         return np.inf, 0.0
     random, largest = np.random.default_rng(3), 0.0
-    # random right sides
     for _ in range(SIDES):
         side = random.standard_normal(int(linear.contents.n))
         lib.core.sd_linear_solve(linear, lib.pointer(side))
@@ -296,7 +293,6 @@ def _index_at(system: System, t: float, y: Floats, yd: Floats) -> tuple[int | No
     names: tuple[str, ...] = ()
     # as it is, in sizes of the unknowns, with steep laws awake
     looks = (jy, jyd), (jy * size, jyd * size), (_rouse_slopes(system, t, jy * size), jyd * size)
-    # the first that tells
     for at, rates in looks[0 if least is None else 1 :]:
         names = null_place(system, at, rates)[0]
         index = None if names else pencil_index(system.dense(rates), system.dense(at))

@@ -26,7 +26,6 @@ def claim_trace(path: Path) -> Iterator[None]:
         try:
             with defer_interruptions():
                 handle = _lock_handle(lock)
-        # another process holds it
         except BlockingIOError as error:
             said = "another run is writing this trace: wait for it, or give -o another name"
             raise TraceError(f"{path}: {said}") from error

@@ -96,13 +96,11 @@ class HeldWriter:
         self, nominal: Mapping[str, float], attributes: Attributes, final: bool, events: Sequence[Happened] = ()
     ) -> None:
         """The trace as `Trace.open` would read it from a file."""
-        # given up already
         if self.closed:
             return
         layout = self._layout
         width = BEFORE + 2 * layout.observed
         rows = np.concatenate(self._rows) if self._rows else np.zeros((0, width))
-        # quantities by their columns
         data = {
             c.name: Quantity(
                 c.name,

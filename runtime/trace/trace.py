@@ -114,7 +114,6 @@ class Trace:
         path = Path(file)
         with _raise_trace_errors(path), input_output(path), open_regular(path) as source:
             data = {name: item for name, item in source.items() if isinstance(item, h5py.Dataset)}
-            # files of other kinds
             if "time" not in data:
                 raise ValueError("no data set 'time': not a trace")
             if of_sweep(source):

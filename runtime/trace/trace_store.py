@@ -294,7 +294,6 @@ class Store:
                 copy = os.memfd_create("sysdyn-trace")
                 size, offset = os.fstat(handle).st_size, 0
                 while offset < size:
-                    # nothing more to copy
                     sent = os.sendfile(copy, handle, offset, size - offset)
                     if sent == 0:
                         break

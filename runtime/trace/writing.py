@@ -47,7 +47,6 @@ class Met:
 
     def take(self, rows: Floats) -> None:
         """Rows [k, 8 + 2 observed]."""
-        # energies, then values
         self._energy(rows[:, 2:6])
         values = rows[:, self._places]
         size = np.abs(values)
@@ -226,7 +225,6 @@ class TraceWriter:
         events: Sequence[Happened] = (),
     ) -> None:
         """Nominal values, last attributes, `final`, events; closes the file.  One that was given up stays as it is."""
-        # given up already
         if self.closed:
             return
         sizes = {column.name: {"nominal": float(nominal.get(column.name, 0.0))} for column in self._layout.columns}

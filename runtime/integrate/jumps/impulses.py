@@ -152,7 +152,6 @@ class Impulses:
             if (side.p != p).any():
                 p[:] = side.p
             found.append(self.system.jacobian(side.t, y + pulse, side.yd))
-        # parameters as they were
         if (own != p).any():
             p[:] = own
         (jy, jyd), (ky, kyd) = found

@@ -398,7 +398,6 @@ class EventModes:
         """The address of the rows that momenta follow from; None: the model has none, 0: they do not tell them."""
         restart = self.handler.restart
         assert restart is not None
-        # no momenta
         if not (restart.settler.system.kinds == "p").any():
             return None
         # how they follow from flows, once
@@ -423,7 +422,6 @@ class EventModes:
 
 def _grow(array: Any, number: int) -> Any:
     """An array of structures with room for one more at `number`: itself, or a larger copy."""
-    # room enough
     if number < len(array):
         return array
     larger = (array._type_ * (2 * len(array)))()

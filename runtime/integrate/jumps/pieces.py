@@ -106,7 +106,6 @@ class Pieces:
 
     def _inform_handler(self) -> None:
         """The handler knows what the core has done without it."""
-        # nothing to hear of
         if self.modes is None:
             return
         # something happened: no landing is awaited any more
@@ -387,7 +386,6 @@ class Pieces:
         run, method = self.run, self.run.method.contents
         self._inform_handler()
         end = self._end
-        # the text jumps first, then samples
         jumps = method.t >= end and self.at + 1 < len(run.segments)  # the text, which is first
         due = [] if jumps else self.handler.due(method.t)
         if not due and method.t < end:  # a bounce that has not come back

@@ -33,7 +33,6 @@ class Segment:
 
 def segments(t0: float, t1: float, stops: Floats | None) -> tuple[Segment, ...]:
     """The pieces of t0..t1; stops before and behind are left out, that at t0 is where the text jumps behind it."""
-    # one smooth piece
     if stops is None or not np.size(stops):
         return (Segment(t0, t1, t0),)
     inside = np.unique(np.asarray(stops, dtype=np.float64))

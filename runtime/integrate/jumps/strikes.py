@@ -75,7 +75,6 @@ def _connected_part(
     label = components(row[joined], column[joined], system.unknowns)
     part = label == label[multiplier]
     there = np.zeros(system.rows, dtype=bool)
-    # rows of that part
     there[row[joined & part[column]]] = True
     return part & (moves | acts), there
 

@@ -104,7 +104,6 @@ class Ledgers:
     def lost(self) -> RowLabel | None:
         """The element whose inertia became negative."""
         found = int(self.core.lost)
-        # none did
         if found < 0:
             return None
         return self._label(found)

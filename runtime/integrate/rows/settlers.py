@@ -77,7 +77,6 @@ class Settlers:
         # not asked for, or rows that rates decide, or too large
         if not request.valued or request.events or request.least_norm or self._point is None:
             return False
-        # condensed, or with rates
         if self._forms is not None or self.whole_form != "settled":
             return False
         # a block that does not say whose rates it shows
@@ -115,7 +114,6 @@ class Settlers:
         # constraints that come and go: any flow may be open
         if self._request.switched:
             return "rated"
-        # too large to ask
         if self._point is None:
             return "rated" if turning else "settled"
         settled = system.another("settled")

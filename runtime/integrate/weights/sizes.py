@@ -62,7 +62,6 @@ class Sizes:
         others |y| met is held, and magnitudes that are not that.
         """
         assert self._own is not None
-        # away already
         if self._away is not None:
             return
         # what the method does not step
@@ -75,7 +74,6 @@ class Sizes:
         self._magnitude = self._met = met[:0].copy()
 
     def _bring_back(self) -> None:
-        # nothing is away
         """Makes the sizes of all unknowns whole again, where `put_away` has let go of them."""
         if self._away is None or self._own is None:
             return
@@ -103,7 +101,6 @@ class Sizes:
     def met(self) -> Floats:
         """Largest |y| met [unknowns]; of a condensed form as far as it is shared (`share`)."""
         self._bring_back()
-        # the first time
         if self._met.size < self.system.unknowns:
             self._met = np.zeros(self.system.unknowns)
         return self._met
@@ -174,7 +171,6 @@ class Sizes:
         """Largest |y| met and magnitude of every unknown; what was eliminated is as large as at the last point y.
         last: in the arrays of the run, which is over.
         """
-        # no sizes besides
         if self._own is None:
             return self.met, self.magnitude
         kept, magnitude, met = whole_of(self._own[0]), *self._own[1:]

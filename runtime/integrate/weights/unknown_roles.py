@@ -161,7 +161,6 @@ def _common(system: System, jyd: Floats, shared: NDArray[np.bool_]) -> Ints:
     read[row[there & shared[column]]] = True
     there &= read[row]
     row, column, value = row[there], column[there], jyd[there]
-    # components of these rows
     group = components(row, column, system.unknowns)
     # rows that sum to zero know differences alone
     total = np.bincount(row, value, system.rows), np.bincount(row, np.abs(value), system.rows)
