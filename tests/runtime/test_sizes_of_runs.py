@@ -53,7 +53,7 @@ def test_meters_are_relative_to_what_went_round():
 
 def sizes(found, least, ceiling=None):
     """Of a run with tolerance 1e-3."""
-    origin = SimpleNamespace(sized=lambda _: (np.array(found), 2.0), least=np.array(least))
+    origin = SimpleNamespace(initial_sizes=lambda _: (np.array(found), 2.0), least=np.array(least))
     return Sizes(masses(), None, SimpleNamespace(rtol=1e-3, t_end=1.0, ceiling=ceiling), origin)
 
 
