@@ -199,7 +199,7 @@ def test_diff_treats_such_a_trace_like_one_that_did_not_end(duffing, tmp_path, c
 def test_golden_record_and_check_refuse_it(duffing, tmp_path, capsys, monkeypatch):
     folder = ["--folder", str(tmp_path / "goldens")]
     assert run(["golden", "record", str(duffing), *folder]) == 0
-    monkeypatch.setattr("sysdyn.runtime.judgement.allowed", lambda options: 1e-17)
+    monkeypatch.setattr("sysdyn.runtime.judgement.allowed_share", lambda options: 1e-17)
     monkeypatch.setattr("sysdyn.runtime.accuracy.runs.Runs.open_balances", lambda self: [0.0])
     assert run(["golden", "check", "duffing", *folder]) == 3
     assert run(["golden", "accept", "duffing", "--reason", "none", *folder]) == 3
