@@ -85,7 +85,7 @@ class Restart:
         """
         known = self.magnitude(y.size)
         try:
-            found = self._struck(t, y, yd, known, quickly=quickly)
+            found = self._struck(t, y, yd, known, quickly=quickly, tried=True)
         except UnbalancedError:
             # a balance that is not met: no point of this set
             found = None
@@ -93,10 +93,10 @@ class Restart:
         return None if found is None or not found[3] else found[:3]
 
     def _struck(
-        self, t: float, y: Floats, yd: Floats, magnitude: Floats, *, quickly: bool = False
+        self, t: float, y: Floats, yd: Floats, magnitude: Floats, *, quickly: bool = False, tried: bool = False
     ) -> tuple[Floats, Floats, Floats, bool] | None:
         """The point on the far side, its impulses, and whether rates of rows are met too; magnitude [unknowns as
-        written] before it.
+        written] before it; tried: of a set of constraints that is tried, not across a jump of the text.
         """
         before, yd = y, yd.copy()
         yd[self.settler.system.idle_multipliers()] = 0.0  # what does not hold any more pushes no more
@@ -109,8 +109,8 @@ class Restart:
             steep = self._search(t, y, yd, free=False)
             if steep is not None and (kept := still(self.settler, t, steep, self.state, magnitude)) is not None:
                 return *kept, np.zeros(y.size), True
-            # no linear row asks for an impulse: contents that would jump all the same are those of a search that failed
-            if steep is None and not self._contradicts:
+            # of a set that is tried no linear row asks for an impulse: contents would jump because the search failed
+            if tried and steep is None and not self._contradicts:
                 return None
         push = None
         # states jump: displacements first, then flows
