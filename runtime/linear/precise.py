@@ -249,7 +249,7 @@ def _round_eigenvalue(value: Any) -> complex:
 
 
 def relative_distances(one: Values, other: Values) -> NDArray[np.float64]:
-    """Relative distance of each value [n] to its partner in another set of as many, nearest first."""
+    """Relative distance of each value [n] to its partner in another set of as many, the largest values paired first."""
     left = list(range(other.size))
     found = np.zeros(one.size)
     # the largest first: each takes the nearest that is left
