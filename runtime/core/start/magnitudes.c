@@ -10,6 +10,7 @@
 #define DUST SD_DEPENDENT /* the same: what is left of a zero, and is never asked */
 #define NOTHING 1e-280 /* less is no magnitude */
 #define TENTH 0.1 /* of a proposal that a steep law does not bear: the next one */
+#define BEYOND 1e6 /* of the largest known of its kind: what a proposal is at most */
 #define SHORTER 320 /* of them: from the largest double to one */
 
 /* small [entries] := 1 where a coefficient is small beside the largest of its row and kind, 2 where it is none; line [rows]: room.  Entries of
@@ -189,7 +190,7 @@ int sd_propagate_beside(const sd_balance *m, const double *size, const char *sma
 int sd_scale(const sd_balance *m, const double *nominal, int32_t first, const char *rated, const int32_t *member,
              int32_t members, const double *x, double *jacobian, double *residual, double *scale)
 {
-    double *most = calloc((size_t)members + 1, sizeof *most);
+    double *most = calloc(2 * ((size_t)members + 1), sizeof *most), *known = most + members + 1;
     if (!most)
         return -1;
     for (int32_t k = 0; k < m->unknowns; k++)
@@ -200,6 +201,12 @@ int sd_scale(const sd_balance *m, const double *nominal, int32_t first, const ch
         jacobian[e] = isfinite(jacobian[e]) ? fabs(jacobian[e]) : 0.0;
     char *small = sd_small(m, jacobian);
     int failed = small ? sd_propagate_beside(m, jacobian, small, residual, rated, NULL, 0, scale) : -1;
+    /* by the slope of a junction that blocks 1e135 V balance its leak: beside what is known of its like that is no size */
+    for (int32_t k = 0; k < first; k++)
+        known[member[k]] = sd_larger(known[member[k]], nominal && nominal[k] > 0.0 ? nominal[k] : fabs(x[k]));
+    for (int32_t k = 0; k < first; k++)
+        if (known[member[k]] > 0.0)
+            scale[k] = sd_smaller(scale[k], BEYOND * known[member[k]]);
     /* unknowns of y are no less than a thousandth of their like */
     for (int32_t k = 0; k < first; k++)
         most[member[k]] = sd_larger(most[member[k]], scale[k]);
