@@ -337,13 +337,14 @@ class _Lowering:
     def constraints(self) -> None:
         """Phi, Psi, Gamma, Lambda, and the total time derivatives of all."""
         for row in self.model.rows:
+            accelerates = row.kind == "phi" or self._prescribes_motion(row)
             for term in row.terms:
                 expression = term.expression
                 if row.kind == "lambda":
                     self.assembly.add("lambda", row.name, row.at, term.loops, neg(expression))
                     continue
                 self.assembly.add(row.kind, row.name, row.at, term.loops, expression)
-                self._rates(row, term.loops, expression)
+                self._rates(row, term.loops, expression, accelerates=accelerates)
             if row.kind == "lambda":
                 own = var(row.name, "s", *row.at, order=1)
                 self.assembly.add("lambda", row.name, row.at, row.nest, own)
@@ -377,18 +378,20 @@ class _Lowering:
         """Whether a gamma reads displacements alone, one of what has inertia: b = sin(t) says what the acceleration
         of b is, and so which effort makes it.
         """
+        if row.kind != "gamma":
+            return False
         read = {v for term in row.terms for v in variables(term.expression) if v.op == "var"}
         own = {v.data[0] for v in read if v.data[1] == self.model.mirror.coordinate and not v.data[2]}
-        return row.kind == "gamma" and len(own) == len({v.data for v in read}) and bool(own - self.massless)
+        return len(own) == len({v.data for v in read}) and bool(own - self.massless)
 
-    def _rates(self, row: Row, nest: Nest, expression: Node) -> None:
+    def _rates(self, row: Row, nest: Nest, expression: Node, *, accelerates: bool) -> None:
         if not self._has_rate(row):
             return
         integrated = any(offset.label == row.name for offset in self.model.offsets)
         with moving(()) if integrated else nullcontext():  # its primitive took parameters for constants
             rate = time_derivative(self._in_states(expression, f"{row.kind} {row.name}", row.place))
             self.assembly.add(f"{row.kind}_rate", row.name, row.at, nest, rate)
-            if row.kind == "phi" or self._prescribes_motion(row):
+            if accelerates:
                 self.assembly.add(f"{row.kind}_acceleration", row.name, row.at, nest, time_derivative(rate))
 
 

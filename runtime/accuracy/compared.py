@@ -40,7 +40,7 @@ class RunComparison:
         self._opened: tuple[Finished, LeftOpen] | None = None
         self._sized: tuple[Finished, Floats] | None = None
         self._range: Floats = np.zeros(0)  # of quantities whose errors are relative to it
-        self.moves = np.zeros(0, dtype=bool)  # which of these have a range beyond round-off of what they ride on
+        self._moves = np.zeros(0, dtype=bool)  # which of these have a range beyond round-off of what they ride on
         self._own: list[Floats] = []
         self.begin()
 
@@ -142,7 +142,7 @@ class RunComparison:
             span = (self._ends[1] - self._ends[0])[quantities.places[which]]
         span = np.where(np.isfinite(span), span, sizes[which])
         # round-off of x rides on x = 1e8 m: smaller ranges are none
-        self.moves = span > pairs.ROUND_OFF * sizes[which]
+        self._moves = span > pairs.ROUND_OFF * sizes[which]
         self._range = sizes[which] = np.maximum(span, pairs.ROUND_OFF * sizes[which])
         noise[which] = np.minimum(noise[which], quantities.accuracy_asked(self.options)[which] * self._range)
         return sizes, noise
@@ -151,7 +151,7 @@ class RunComparison:
         """What errors of the quantities that are judged by their range are relative to: that, or where it is round-off
         the largest of their values [those quantities].
         """
-        return np.where(self.moves, self._range, values)
+        return np.where(self._moves, self._range, values)
 
     def _passed_over(self, finished: Finished, quantities: Quantities) -> Floats | None:
         """How far the compared quantities [compared] are from the run before in what one step of that passes over; None

@@ -257,13 +257,13 @@ class _Starts:
         # no one-way flow that may turn, or too large
         if not free or contacts.system.unknowns > DENSE:
             return None
-        state = self._begun([contacts.contacts[k].number for k in free])
+        state = self._quick_start([contacts.contacts[k].number for k in free])
         constants = contacts.system.description.p[self._constants]
         # stores would move: with all of them holding instead
         if state is None or not state.kept:
             contacts.active[free] = True
             contacts.apply()
-            other = self._begun()
+            other = self._quick_start()
             if other is not None and (state is None or state.farther(other)):
                 state, constants = other, contacts.system.description.p[self._constants]
         # neither has a start
@@ -273,7 +273,7 @@ class _Starts:
         self._size(self._t, state.y, state.yd)
         return state.y
 
-    def _begun(self, without: Sequence[int] = ()) -> ConsistentState | None:
+    def _quick_start(self, without: Sequence[int] = ()) -> ConsistentState | None:
         """The start of the present set, quickly, where these switches ask for nothing."""
         with suppress(InconsistentStart):
             return consistent_start(

@@ -50,10 +50,10 @@ class Budget:
         if self.of is not None:
             self.of.count(operations)
 
-    def left(self, own: float, one: float) -> float:
+    def share_left(self, own: float, one: float) -> float:
         """Times what a search may, `one`, that it grants to one which has spent `own`."""
         here = self.times - (self.spent - own) / one
-        return here if self.of is None else min(here, self.of.left(own, one))
+        return here if self.of is None else min(here, self.of.share_left(own, one))
 
 
 @dataclass(slots=True)
@@ -108,4 +108,4 @@ class Work:
     @property
     def allowed(self) -> float:
         """The share that the budget leaves of it."""
-        return min(self.share, self.budget.left(self.spent, max(GRANTED, ITERATIONS * self.largest)))
+        return min(self.share, self.budget.share_left(self.spent, max(GRANTED, ITERATIONS * self.largest)))

@@ -54,7 +54,6 @@ class Restart:
 
     def __init__(self, settler: Settler, state: NDArray[np.bool_]) -> None:
         self.settler, self.state, self.sums = settler, state, True
-        self._contradicts = False  # linear rows leave no point with the state held
         self.instant = Instant(settler.system)
 
     def across(self, t: float, y: Floats, yd: Floats) -> tuple[Floats, Floats] | None:
@@ -106,11 +105,11 @@ class Restart:
             return *same, np.zeros(y.size), self._lives
         # a switch that opens on a coil: the exponential law beside it bears its current, and no store jumps
         if self.settler.system.form.scales and not quickly:
-            steep = self._search(t, y, yd, free=False)
+            steep, contradicts = self._search(t, y, yd, free=False)
             if steep is not None and (kept := still(self.settler, t, steep, self.state, magnitude)) is not None:
                 return *kept, np.zeros(y.size), True
             # of a set that is tried no linear row asks for an impulse: contents would jump because the search failed
-            if tried and steep is None and not self._contradicts:
+            if tried and steep is None and not contradicts:
                 return None
         push = None
         # states jump: displacements first, then flows
@@ -131,7 +130,7 @@ class Restart:
         if quickly or unmet(self.settler, t, y, yd, self.settler.alone(self.state)):
             return None
         # what follows is sought from where it was: impulses move it along slopes that steep laws had before the jump
-        searched = self._search(t, np.where(self.state, y, before), yd)
+        searched, _ = self._search(t, np.where(self.state, y, before), yd)
         stays = searched is not None and self._stays(searched[0], y, magnitude)
         return (*searched, impulse, True) if searched is not None and stays else None
 
@@ -162,8 +161,12 @@ class Restart:
         """Magnitudes [number] of the first unknowns."""
         return lib.reader(self.settler.core.contents.scale, number).copy()
 
-    def _search(self, t: float, y: Floats, yd: Floats, *, free: bool = True) -> tuple[Floats, Floats] | None:
-        """y, yd as a start finds them: first with the state held, then (free) with everything free."""
+    def _search(
+        self, t: float, y: Floats, yd: Floats, *, free: bool = True
+    ) -> tuple[tuple[Floats, Floats] | None, bool]:
+        """y, yd as a start finds them, first with the state held, then (free) with everything free, and whether linear
+        rows leave none there.
+        """
         # rows of a start, without initial values
         starter = Starter(self.settler.system.another("3"))
         starter.every &= ~starter.groups("initial")
@@ -177,8 +180,8 @@ class Restart:
         # the state held, then free
         for held in (state, np.zeros_like(state))[: 1 + free]:
             may = ~(idle | held)
-            self._contradicts = contradicting(starter, t, guess, may) is not None
-            found = None if self._contradicts else behind(starter, t, guess, may)
+            contradicts = contradicting(starter, t, guess, may) is not None
+            found = None if contradicts else behind(starter, t, guess, may)
             if found is not None:
-                return starter.expand(found)
-        return None
+                return starter.expand(found), False
+        return None, contradicts

@@ -130,7 +130,7 @@ def _onto(starter: Starter, t: float, x: Floats, guess: Floats, *, rows: Mask, f
     return found.x if found.residual < EXACT else x
 
 
-def _begun(starter: Starter, t: float, guess: Floats, free: Mask) -> Floats:
+def _starting_point(starter: Starter, t: float, guess: Floats, free: Mask) -> Floats:
     """Where the iteration begins, on the roots that are meant: what written expressions give where the others are as
     guessed, then what follows beside implicit unknowns at their guesses.
     """
@@ -234,7 +234,7 @@ def _number(starter: Starter, rows: Mask, unknowns: Mask) -> Places:
 
 def _attempt(starter: Starter, t: float, guess: Floats, free: Mask, *, quickly: bool = False) -> tuple[Solution, str]:
     """The first strategy that holds, from the guess, and its name; the least residual and "" where none does."""
-    x = _finite(starter, t, _begun(starter, t, guess, free), free)
+    x = _finite(starter, t, _starting_point(starter, t, guess, free), free)
     # strategies in turn, the exact solution of the first that holds
     best = Solution(x, np.inf)
     for name, strategy in applicable(starter, t, x, free, quickly=quickly):

@@ -96,7 +96,7 @@ def _newton(starter: Starter, t: float, x: Floats, guess: Floats, free: Mask) ->
     if not nearly:
         return
     # everything at once, from what nearly holds
-    everything, holds = next(_moved(starter, t, x, guess, free))
+    everything, holds = next(_newton_with_moving_state(starter, t, x, guess, free))
     if x.size <= DENSE:
         moved = np.abs(everything.x - found.x) > OWN * starter.largest_alike(starter.scale(t, found.x))
         if (moved & ~follows).any():  # to another root
@@ -105,7 +105,7 @@ def _newton(starter: Starter, t: float, x: Floats, guess: Floats, free: Mask) ->
     yield found, True
 
 
-def _moved(starter: Starter, t: float, x: Floats, guess: Floats, free: Mask) -> Tries:
+def _newton_with_moving_state(starter: Starter, t: float, x: Floats, guess: Floats, free: Mask) -> Tries:
     """Everything by Newton's method, the state by its least change."""
     with starter.granted(STRAIGHT_ON):  # what a state that contradicts has taken is not missed then
         everything = rescaled(starter, t, x, guess, free)
@@ -164,7 +164,7 @@ def _completed(starter: Starter, t: float, x: Floats, guess: Floats, free: Mask)
     return rescaled(starter, t, x, guess, free, sized=sized)
 
 
-def _faded_out(starter: Starter, t: float, x: Floats, guess: Floats, free: Mask) -> Tries:
+def _homotopy_from_guess(starter: Starter, t: float, x: Floats, guess: Floats, free: Mask) -> Tries:
     """What follows from the state along what fades of the misses at x of rows without rates, as fast as Newton's method
     follows, then by all rows (Newton's homotopy: Allgower and Georg 1990): of a jump, its rise drawn out.
     """
@@ -172,7 +172,7 @@ def _faded_out(starter: Starter, t: float, x: Floats, guess: Floats, free: Mask)
         yield from _along(starter, t, (x, x), guess, follows)
 
 
-def _risen(starter: Starter, t: float, x: Floats, guess: Floats, free: Mask) -> Tries:
+def _homotopy_from_nothing(starter: Starter, t: float, x: Floats, guess: Floats, free: Mask) -> Tries:
     """What the homotopy leads to from nothing, where sources and what stores hold rise (source stepping: Nagel 1975):
     at rest no law is steep.
     """
@@ -181,7 +181,7 @@ def _risen(starter: Starter, t: float, x: Floats, guess: Floats, free: Mask) -> 
         yield from _along(starter, t, (np.zeros_like(x), x), guess, follows)
 
 
-def _between(starter: Starter, t: float, x: Floats, guess: Floats, free: Mask) -> Tries:
+def _homotopy_from_between(starter: Starter, t: float, x: Floats, guess: Floats, free: Mask) -> Tries:
     """What the homotopy leads to from where flows of which nothing is said are between those beside them: a node
     guessed at 0 V below one at 400 V lies where no slope of a junction is left, or beyond the largest number.
     """
@@ -191,7 +191,7 @@ def _between(starter: Starter, t: float, x: Floats, guess: Floats, free: Mask) -
         yield from _along(starter, t, (near, near), guess, follows)
 
 
-def _moved_along(starter: Starter, t: float, x: Floats, guess: Floats, free: Mask) -> Tries:
+def _homotopy_with_moving_state(starter: Starter, t: float, x: Floats, guess: Floats, free: Mask) -> Tries:
     """Everything along what fades of the misses at x."""
     yield from _along(starter, t, (x, x), guess, free)
 
@@ -227,7 +227,7 @@ def _at_the_end(starter: Starter, t: float, way: tuple[Floats, Floats], free: Ma
     while done < 1.0 and part > LEAST_PART and not starter.work.done:
         to = min(done + part, 1.0)
         drawn = np.where(free, at, begun + to * (end - begun))
-        found = _followed(starter, t, drawn, (rows, free), _faded(starter, t, (1.0 - to) * miss))
+        found = _follow(starter, t, drawn, (rows, free), _faded(starter, t, (1.0 - to) * miss))
         if found is None:
             part, grows = 0.5 * part, False
             continue
@@ -240,7 +240,7 @@ def _faded(starter: Starter, t: float, miss: Floats) -> Callable[[Floats], Float
     return lambda x: starter.residual(t, x) - miss
 
 
-def _followed(
+def _follow(
     starter: Starter, t: float, x: Floats, what: tuple[Mask, Mask], left: Callable[[Floats], Floats]
 ) -> Floats | None:
     """From x where these rows, in what is free, nearly hold in magnitudes of their own; None where Newton's method does
@@ -305,11 +305,11 @@ def around(starter: Starter, t: float, x: Floats, free: Mask) -> Iterator[Floats
 
 STRATEGIES: tuple[tuple[str, Strategy], ...] = (
     ("newton", _newton),
-    ("homotopy", _faded_out),
-    ("homotopy", _risen),
-    ("homotopy", _between),
-    ("newton", _moved),
-    ("homotopy", _moved_along),
+    ("homotopy", _homotopy_from_guess),
+    ("homotopy", _homotopy_from_nothing),
+    ("homotopy", _homotopy_from_between),
+    ("newton", _newton_with_moving_state),
+    ("homotopy", _homotopy_with_moving_state),
 )
 """Globalisation: what is tried, in this order, until all rows hold: the state as it is before it moves."""
 

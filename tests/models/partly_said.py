@@ -154,7 +154,7 @@ def starts(text, formulations=(*FOUR, "kane")):
     return found
 
 
-def apart(contents, found):
+def largest_difference(contents, found):
     """Largest difference between the contents of two formulations, as a part of the largest of its kind."""
     values = [value[: len(contents)] for value, _ in found.values() if isinstance(value, np.ndarray)]
     if len(values) < 2 or not contents:
@@ -175,7 +175,7 @@ def judged(sort, seed):
     refused = {name: value for name, (value, _) in found.items() if not isinstance(value, np.ndarray)}
     if len(refused) == len(found):
         return f"refused {next(iter(refused.values()))}", longest
-    if (far := apart(contents, found)) > CLOSE:
+    if (far := largest_difference(contents, found)) > CLOSE:
         return f"apart by {far:.2g}", longest
     return (f"some refuse {refused}" if refused else "agree"), longest
 

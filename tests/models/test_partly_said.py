@@ -5,7 +5,7 @@ import os
 import numpy as np
 import pytest
 from model_runs import FOUR, trace_of
-from partly_said import CLOSE, TEXTS, apart, starts
+from partly_said import CLOSE, TEXTS, largest_difference, starts
 from scipy.integrate import solve_ivp
 from scipy.optimize import brentq
 from start_strategies import prepared_start
@@ -145,12 +145,12 @@ def test_random_texts_begin_alike_in_every_formulation(sort):
     seeds = (*range(600 if os.environ.get("SYSDYN_LONG") else 4), *HARD[sort])
     for seed in seeds:
         text, contents = TEXTS[sort](seed)
-        assert apart(contents, starts(text)) <= CLOSE, seed
+        assert largest_difference(contents, starts(text)) <= CLOSE, seed
 
 
 def test_the_comparison_notices_what_begins_elsewhere():
     there = {"one": (np.array([1.0, 2.0]), 0.0), "two": (np.array([1.0, 2.1]), 0.0), "three": (["E903"], 0.0)}
-    assert apart(["C1.e", "C2.e"], there) == pytest.approx(0.1 / 2.1)
+    assert largest_difference(["C1.e", "C2.e"], there) == pytest.approx(0.1 / 2.1)
 
 
 SPRINGS = """\

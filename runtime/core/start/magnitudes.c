@@ -10,8 +10,8 @@
 #define DUST SD_DEPENDENT /* the same: what is left of a zero, and is never asked */
 #define NOTHING 1e-280 /* less is no magnitude */
 #define TENTH 0.1 /* of a proposal that a steep law does not bear: the next one */
-#define BEYOND 1e6 /* of the largest known of its kind: what a proposal is at most */
 #define SHORTER 320 /* of them: from the largest double to one */
+#define BEYOND 1e6 /* of the largest known of its kind: what a proposal is at most */
 
 /* small [entries] := 1 where a coefficient is small beside the largest of its row and kind, 2 where it is none; line [rows]: room.  Entries of
  * a kind lie beside each other, for unknowns do. */
@@ -195,6 +195,8 @@ int sd_scale(const sd_balance *m, const double *nominal, int32_t first, const ch
         return -1;
     for (int32_t k = 0; k < m->unknowns; k++)
         scale[k] = nominal && k < first && nominal[k] > 0.0 ? nominal[k] : fabs(x[k]);
+    for (int32_t k = 0; k < first; k++)
+        known[member[k]] = sd_larger(known[member[k]], scale[k]);
     for (int32_t r = 0; r < m->rows; r++)
         residual[r] = isfinite(residual[r]) ? fabs(residual[r]) : 0.0;
     for (int32_t e = 0; e < m->entries; e++)
@@ -202,8 +204,6 @@ int sd_scale(const sd_balance *m, const double *nominal, int32_t first, const ch
     char *small = sd_small(m, jacobian);
     int failed = small ? sd_propagate_beside(m, jacobian, small, residual, rated, NULL, 0, scale) : -1;
     /* by the slope of a junction that blocks 1e135 V balance its leak: beside what is known of its like that is no size */
-    for (int32_t k = 0; k < first; k++)
-        known[member[k]] = sd_larger(known[member[k]], nominal && nominal[k] > 0.0 ? nominal[k] : fabs(x[k]));
     for (int32_t k = 0; k < first; k++)
         if (known[member[k]] > 0.0)
             scale[k] = sd_smaller(scale[k], BEYOND * known[member[k]]);
